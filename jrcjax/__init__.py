@@ -1,0 +1,20 @@
+"""Joint radar-communications for autonomous vehicles in JAX: environment, exact solver and learners.
+
+Reproduces and examines N. Q. Hieu et al., "Transferable Deep Reinforcement Learning Framework for Autonomous Vehicles
+with Joint Radar-Data Communications" (arXiv:2105.13670), called the paper throughout.
+"""
+
+from jrcjax import events, exact, radar
+from jrcjax.checks import check_params
+from jrcjax.environment import EnvState, JRCEnv
+from jrcjax.hparams import Config, HParams
+from jrcjax.params import EnvParams
+from jrcjax.presets import paper_params
+from jrcjax.training import AgentState, Log, train
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "AgentState", "Config", "EnvParams", "EnvState", "HParams", "JRCEnv", "Log", "check_params", "events", "exact",
+    "paper_params", "radar", "train",
+]  # fmt: skip

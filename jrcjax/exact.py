@@ -1,0 +1,160 @@
+"""The exact solver: the finite model's tables, its optimum, and the long-run figures of any policy.
+
+The tables come from the functions that the simulator calls in each slot, over all states and actions.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jrcjax import metrics, states
+from jrcjax.channel import delivered_packets
+from jrcjax.events import event_probability
+from jrcjax.params import EnvParams
+from jrcjax.radar import mean_miss_ratio
+from jrcjax.rewards import reward
+from jrcjax.types import Float, Int
+
+
+class LongRun(NamedTuple):
+    """Long-run means per slot of one policy, scalars."""
+
+    reward: Float
+    throughput: Float
+    """Packets per slot."""
+    miss_detection: Float
+    """Equation (7) in the parameters' convention; NaN if the policy never meets a slot that counts."""
+
+
+def level_transition(prior: Float, persistence: Float) -> Float:
+    """Transition matrix of one factor, [J, J]: kappa I + (1 - kappa) 1 tau^T."""
+    return persistence * jnp.eye(prior.shape[0]) + (1.0 - persistence) * prior[None, :]
+
+
+def state_transition(params: EnvParams) -> Float:
+    """P(s' | s), [S, S]. Factors evolve independently, so it is the Kronecker product of theirs."""
+    matrix = jnp.ones((1, 1))
+    for factor in params.factors:
+        matrix = jnp.kron(matrix, level_transition(factor.prior, factor.persistence))
+    return matrix
+
+
+def transition_tensor(params: EnvParams) -> Float:
+    """P(s' | s, a), [S, A, S]; equation (10). Actions have no influence on the state."""
+    matrix = state_transition(params)
+    return jnp.broadcast_to(matrix[:, None, :], (params.num_states, params.num_actions, params.num_states))
+
+
+def stationary_distribution(params: EnvParams) -> Float:
+    """Long-run probability of each state under every policy, [S]: the product of the priors."""
+    law = jnp.ones(1)
+    for factor in params.factors:
+        law = jnp.kron(law, factor.prior)
+    return law
+
+
+def packet_table(params: EnvParams) -> Float:
+    """Packets delivered in each state by each action, [S, A]; 0 for radar."""
+    channel = states.levels_of(jnp.arange(params.num_states), params.shape)[:, 0]
+    rates = jnp.arange(params.num_rates)
+    sent = jax.vmap(lambda c: jax.vmap(lambda r: delivered_packets(c, r, params.channel))(rates))(channel)
+    return jnp.pad(sent, ((0, 0), (0, params.radar.num_modes)))
+
+
+def miss_table(params: EnvParams) -> Float:
+    """E[p_k] of each action, [A]; 1 for data."""
+    return jnp.concatenate([jnp.ones(params.num_rates), mean_miss_ratio(params.radar)])
+
+
+def _is_data(params: EnvParams) -> jax.Array:
+    return jnp.arange(params.num_actions) < params.num_rates
+
+
+def expected_reward(params: EnvParams) -> Float:
+    """E[rho | s, a], [S, A]; equation (11) averaged over event and placement, in both of which it is linear."""
+    p = event_probability(params)[:, None]
+    packets = packet_table(params)
+    given = [reward(_is_data(params), event, packets, miss_table(params), params.reward_weights) for event in (True, False)]
+    return p * given[0] + (1.0 - p) * given[1]
+
+
+def value_iteration(params: EnvParams, gamma: Float | float = 0.99, tolerance: float = 1e-4) -> Float:
+    """Q* of the discounted problem, [S, A].
+
+    Relative value iteration with MacQueen's bounds: after each sweep the optimal values lie within gamma / (1 - gamma)
+    times the smallest and largest change, so it stops when these bounds are `tolerance` apart and takes their middle.
+
+    Args:
+      params: the environment.
+      gamma: discount in [0, 1).
+      tolerance: largest error of a value, in units of reward; float32 rounding comes on top.
+    """
+    transition, rewards = transition_tensor(params), expected_reward(params)
+    gamma = jnp.asarray(gamma, jnp.float32)
+    scale = gamma / (1.0 - gamma)
+
+    def backup(values: Float) -> Float:
+        return rewards + gamma * transition @ values
+
+    def bounds(change: Float) -> tuple[Float, Float]:
+        return scale * change.min(), scale * change.max()
+
+    def unsettled(carry):
+        _, change, sweeps = carry
+        low, high = bounds(change)
+        # Rounding keeps the change from becoming constant to the last bit, hence the limit on sweeps.
+        return (high - low > tolerance) & (sweeps < 20_000)
+
+    def sweep(carry):
+        values, _, sweeps = carry
+        new = backup(values).max(axis=1)
+        change = new - values
+        # Only differences matter until the end; small numbers round less.
+        return new - new.min(), change, sweeps + 1
+
+    start = (jnp.zeros(params.num_states), jnp.full(params.num_states, jnp.inf).at[0].set(-jnp.inf), 0)
+    relative, _, _ = jax.lax.while_loop(unsettled, sweep, start)
+    # One more sweep from the relative values gives bounds that refer to exactly these values.
+    new = backup(relative).max(axis=1)
+    low, high = bounds(new - relative)
+    return backup(new) + gamma * (low + high) / 2.0
+
+
+def optimal_policy(params: EnvParams, gamma: Float | float = 0.99) -> Float:
+    """The greedy policy of Q*, [S, A] with one 1 per row."""
+    return greedy_policy(value_iteration(params, gamma))
+
+
+def greedy_policy(q: Float) -> Float:
+    """Probabilities [..., S, A] of the policy that takes the largest value, the first of equals."""
+    return jax.nn.one_hot(jnp.argmax(q, axis=-1), q.shape[-1])
+
+
+def policy_of_actions(actions: Int, num_actions: int) -> Float:
+    """Probabilities [..., S, A] of a deterministic policy given as actions [..., S]."""
+    return jax.nn.one_hot(actions, num_actions)
+
+
+def evaluate_policy(params: EnvParams, policy: Float) -> LongRun:
+    """Long-run reward, throughput and miss detection per slot of a stationary policy.
+
+    Args:
+      params: the environment.
+      policy: [S, A] probability of each action in each state.
+    """
+    visits = stationary_distribution(params)[:, None] * policy
+    p = event_probability(params)[:, None]
+    packets, miss, is_data = packet_table(params), miss_table(params), _is_data(params)
+    by_event = ((True, p), (False, 1.0 - p))
+    throughput = sum(
+        (visits * q * metrics.counted_packets(packets, jnp.bool_(event), params.count_event_packets)).sum()
+        for event, q in by_event
+    )
+    counted = [
+        visits * q * metrics.counts_for_miss(is_data, jnp.bool_(event), params.miss_convention) for event, q in by_event
+    ]
+    sums = metrics.zero()._replace(missed=sum((c * miss).sum() for c in counted), counted=sum(c.sum() for c in counted))
+    return LongRun((visits * expected_reward(params)).sum(), throughput, metrics.miss_detection(sums))

@@ -1,0 +1,115 @@
+"""Hyperparameters: `HParams` holds numbers that may be vmapped over, `Config` what decides shapes and code."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import jax.numpy as jnp
+import numpy as np
+import optax
+from flax import struct
+
+from jrcjax.checks import refuse, require
+from jrcjax.types import Float, Int
+
+OPTIMISERS = ("adam", "sgd", "rmsprop")
+FORMS = ("auto", "table", "rows")
+_MAX_TABLE_STATES = 256  # beyond it three rows per sample of a mini-batch cost less than all states
+
+
+def _f32(value: float):
+    return struct.field(default_factory=lambda: jnp.float32(value))
+
+
+@struct.dataclass
+class HParams:
+    """Numbers of the learners, all scalars; defaults are Table I, or the first reading where it is silent."""
+
+    discount: Float = _f32(0.99)
+    """gamma, in [0, 1)."""
+    epsilon_start: Float = _f32(1.0)
+    """Probability of a random action at first."""
+    epsilon_end: Float = _f32(0.01)
+    """Probability of a random action after `epsilon_slots`."""
+    epsilon_slots: Float = _f32(30_000.0)
+    """Slots over which epsilon falls linearly: 100 episodes of 300 slots."""
+    learning_rate: Float = _f32(1e-3)
+    """nu of equation (21)."""
+    target_period: Int = struct.field(default_factory=lambda: jnp.int32(300))
+    """upsilon, updates between two copies into the target network."""
+    step_exponent: Float = _f32(0.7)
+    """Q-learning's step size is n(s, a)^-exponent; in (0.5, 1] it satisfies equation (14)."""
+    step_constant: Float = _f32(0.0)
+    """If positive, Q-learning's step size instead of the count-based one."""
+
+
+@dataclass(frozen=True)
+class Config:
+    """Static settings of a training run; defaults are Table I."""
+
+    episodes: int = 1000
+    """Episodes of `max_steps_in_episode` slots."""
+    batch_size: int = 64
+    """N_b, samples per update."""
+    replay_capacity: int = 50_000
+    """|D_re|, transitions that the replay memory holds."""
+    hidden: tuple[int, ...] = (24, 24)
+    """Widths of the hidden layers."""
+    optimiser: str | optax.GradientTransformation = "adam"
+    """One of OPTIMISERS, or an optax transformation without its learning rate, which `HParams` holds."""
+    form: str = "auto"
+    """How the loss is computed: "table" evaluates the network on all states and indexes the result, "rows" on the
+    samples of the mini-batch; "auto" takes the table up to 256 states. Both give the same gradient."""
+
+    def uses_table(self, num_states: int) -> bool:
+        """Whether the loss is computed on the table of all states."""
+        return self.form == "table" or (self.form == "auto" and num_states <= _MAX_TABLE_STATES)
+
+
+def optimiser_of(config: Config) -> optax.GradientTransformation:
+    """The optax transformation that `config.optimiser` names, without its learning rate."""
+    if not isinstance(config.optimiser, str):
+        return config.optimiser
+    return {"adam": optax.scale_by_adam, "sgd": optax.identity, "rmsprop": optax.scale_by_rms}[config.optimiser]()
+
+
+def check_hparams(hparams: HParams) -> None:
+    """Checks hyperparameters.
+
+    Raises:
+      ValueError: naming the field, the value and what is allowed.
+    """
+    if not isinstance(hparams, HParams):
+        raise ValueError(f"hparams: {type(hparams).__name__}; allowed: HParams")
+    unit = lambda x: (x >= 0) & (x <= 1)  # noqa: E731
+    require("hparams.discount", hparams.discount, (), lambda x: (x >= 0) & (x < 1), "a number in [0, 1)")
+    require("hparams.epsilon_start", hparams.epsilon_start, (), unit, "a probability in [0, 1]")
+    require("hparams.epsilon_end", hparams.epsilon_end, (), unit, "a probability in [0, 1]")
+    require("hparams.epsilon_slots", hparams.epsilon_slots, (), lambda x: x > 0, "a number of slots > 0")
+    require("hparams.learning_rate", hparams.learning_rate, (), lambda x: x > 0, "a number > 0")
+    period = lambda x: (x >= 1) & (x == np.floor(x))  # noqa: E731
+    require("hparams.target_period", hparams.target_period, (), period, "an integer >= 1")
+    exponent = lambda x: (x > 0.5) & (x <= 1)  # noqa: E731
+    require("hparams.step_exponent", hparams.step_exponent, (), exponent, "a number in (0.5, 1], equation (14)")
+    require("hparams.step_constant", hparams.step_constant, (), unit, "a number in [0, 1], 0 for count-based steps")
+
+
+def check_config(config: Config) -> None:
+    """Checks static settings.
+
+    Raises:
+      ValueError: naming the field, the value and what is allowed.
+    """
+    if not isinstance(config, Config):
+        raise ValueError(f"config: {type(config).__name__}; allowed: Config")
+    for name in ("episodes", "batch_size", "replay_capacity"):
+        value = getattr(config, name)
+        if not isinstance(value, int) or isinstance(value, bool) or not 1 <= value < 2**31:
+            refuse(f"config.{name}", value if isinstance(value, int | float) else str(value), "an integer from 1 to 2^31 - 1")
+    if not isinstance(config.hidden, tuple) or not all(isinstance(w, int) and w >= 1 for w in config.hidden):
+        refuse("config.hidden", str(config.hidden), "a tuple of integers >= 1")
+    known = isinstance(config.optimiser, optax.GradientTransformation) or config.optimiser in OPTIMISERS
+    if not known:
+        refuse("config.optimiser", str(config.optimiser), f"{', '.join(map(repr, OPTIMISERS))}, or an optax transformation")
+    if config.form not in FORMS:
+        refuse("config.form", str(config.form), ", ".join(map(repr, FORMS)))

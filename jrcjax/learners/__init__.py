@@ -1,0 +1,26 @@
+"""Learners by name."""
+
+from __future__ import annotations
+
+from jrcjax.hparams import Config
+from jrcjax.learners.base import Learner, LearnerFactory, Spec
+from jrcjax.learners.ddqn import ddqn
+from jrcjax.learners.q_learning import q_learning
+from jrcjax.learners.round_robin import round_robin
+from jrcjax.types import choice
+
+LEARNERS: dict[str, LearnerFactory] = {"round_robin": round_robin, "q_learning": q_learning, "ddqn": ddqn}
+
+__all__ = ["LEARNERS", "Learner", "LearnerFactory", "Spec", "ddqn", "make_learner", "q_learning", "round_robin"]
+
+
+def make_learner(learner: str | LearnerFactory, spec: Spec, config: Config) -> Learner:
+    """The learner of that name, or of that factory, for a problem.
+
+    Raises:
+      ValueError: for an unknown name.
+    """
+    if isinstance(learner, str):
+        choice("learner", learner, tuple(LEARNERS))
+        learner = LEARNERS[learner]
+    return learner(spec, config)

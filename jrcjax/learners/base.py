@@ -1,0 +1,39 @@
+"""What a learner is: a few pure functions on one agent's state. Learners know ids and arrays, not the environment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from jrcjax.hparams import Config, HParams
+from jrcjax.replay import Transition
+from jrcjax.types import Float, Int, Key, Words
+
+State = Any
+"""A learner's own pytree."""
+
+
+class Spec(NamedTuple):
+    """The static side of a problem."""
+
+    shape: tuple[int, ...]
+    """Levels per factor; S is their product."""
+    num_actions: int
+    """A."""
+
+
+class Learner(NamedTuple):
+    """One agent's learning rule. `slot` counts slots from 0 and is the same for all agents of a batch."""
+
+    num_words: int
+    """Random words per slot, split between `act` (the first two) and `update`."""
+    init: Callable[[Key, HParams], State]
+    act: Callable[[State, Int, Int, Words, HParams], Int]
+    """(learner state, state id, slot, words, hparams) to an action."""
+    update: Callable[[State, Transition, Int, Words, HParams], State]
+    """(learner state, transition, slot, words, hparams) to the next learner state."""
+    policy: Callable[[State], Float]
+    """Learner state to the policy without exploration, [S, A] probabilities."""
+
+
+LearnerFactory = Callable[[Spec, Config], Learner]

@@ -1,0 +1,49 @@
+"""Tabular Q-learning: the paper's equations (13) and (14)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+
+from jrcjax import exploration
+from jrcjax.exact import greedy_policy
+from jrcjax.hparams import Config, HParams
+from jrcjax.learners.base import Learner, Spec
+from jrcjax.replay import Transition
+from jrcjax.schedules import epsilon
+from jrcjax.states import num_states
+from jrcjax.types import Float, Int
+from jrcjax.value_learning import q_learning_error, robbins_monro_step
+
+
+class QState(NamedTuple):
+    """A table of values and how often each entry was updated."""
+
+    q: Float
+    """[S, A]."""
+    visits: Int
+    """[S, A]."""
+
+
+def q_learning(spec: Spec, config: Config) -> Learner:
+    """Q-learning on a table that starts at zero."""
+    del config
+    shape = (num_states(spec.shape), spec.num_actions)
+
+    def init(key, hparams: HParams) -> QState:
+        return QState(jnp.zeros(shape), jnp.zeros(shape, jnp.int32))
+
+    def act(state: QState, state_id, slot, words, hparams: HParams):
+        return exploration.epsilon_greedy(words, state.q[state_id], epsilon(slot, hparams))
+
+    def update(state: QState, transition: Transition, slot, words, hparams: HParams) -> QState:
+        s, a, reward, next_state, terminal = transition
+        visits = state.visits.at[s, a].add(1)
+        counted = robbins_monro_step(visits[s, a], hparams.step_exponent)
+        step = jnp.where(hparams.step_constant > 0, hparams.step_constant, counted)
+        discount = hparams.discount * (1 - terminal)
+        error = q_learning_error(state.q, s, a, reward, next_state, discount)
+        return QState(state.q.at[s, a].add(step * error), visits)
+
+    return Learner(exploration.NUM_WORDS, init, act, update, lambda state: greedy_policy(state.q))

@@ -1,0 +1,22 @@
+"""Round Robin: all actions in turn, without learning (the paper, section VI-A.4)."""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+
+from jrcjax.hparams import Config
+from jrcjax.learners.base import Learner, Spec
+from jrcjax.states import num_states
+
+
+def round_robin(spec: Spec, config: Config) -> Learner:
+    """Action t mod A in slot t, whatever the state; in the long run the uniform policy."""
+    del config
+    uniform = jnp.full((num_states(spec.shape), spec.num_actions), 1.0 / spec.num_actions)
+    return Learner(
+        num_words=0,
+        init=lambda key, hparams: (),
+        act=lambda state, state_id, slot, words, hparams: (slot % spec.num_actions).astype(jnp.int32),
+        update=lambda state, transition, slot, words, hparams: state,
+        policy=lambda state: uniform,
+    )

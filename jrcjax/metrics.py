@@ -1,0 +1,60 @@
+"""Performance metrics: the paper's equations (6) and (7) in all conventions.
+
+Each slot adds to sums; an episode's metric is a function of its sums, so a mean over slots of any number of
+episodes comes from added sums.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+
+from jrcjax.types import Bool, Float, Int
+
+
+class Metrics(NamedTuple):
+    """Sums over slots, scalars."""
+
+    slots: Float
+    reward: Float
+    packets: Float
+    missed: Float
+    """Sum of p_k(t) over the slots that the convention counts."""
+    counted: Float
+    """Number of slots that the convention counts."""
+
+
+def zero() -> Metrics:
+    """No slots."""
+    return Metrics(*[jnp.float32(0.0)] * len(Metrics._fields))
+
+
+def counted_packets(packets: Float, event: Bool, count_event_packets: Int) -> Float:
+    """Packets of one slot that count as throughput; equation (6) counts all."""
+    return jnp.where(event & (count_event_packets == 0), 0.0, packets)
+
+
+def counts_for_miss(is_data: Bool, event: Bool, convention: Int) -> Bool:
+    """Whether a slot enters the mean in equation (7), by index into MISS_CONVENTIONS."""
+    return (convention == 0) | ((convention == 1) & event) | ((convention == 2) & ~is_data)
+
+
+def slot_miss(is_data: Bool, radar_miss_ratio: Float) -> Float:
+    """p_k(t): a slot spent on data detects nothing, so it misses all (N_k = 0)."""
+    return jnp.where(is_data, 1.0, radar_miss_ratio)
+
+
+def average_reward(sums: Metrics) -> Float:
+    """Reward per slot."""
+    return sums.reward / sums.slots
+
+
+def throughput(sums: Metrics) -> Float:
+    """Packets in all slots of the sums; equation (6) for one episode."""
+    return sums.packets
+
+
+def miss_detection(sums: Metrics) -> Float:
+    """P_k, equation (7); NaN if no slot counts (an episode without events or without radar)."""
+    return jnp.where(sums.counted > 0, sums.missed / jnp.maximum(sums.counted, 1.0), jnp.nan)

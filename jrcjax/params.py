@@ -1,0 +1,80 @@
+"""Environment parameters: one frozen pytree whose numbers may all be traced and vmapped over."""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+from flax import struct
+
+from jrcjax import states
+from jrcjax.channel import Channel
+from jrcjax.radar import Radar
+from jrcjax.types import Float, Int
+
+FACTORS = ("channel", "road", "weather", "speed", "nearby")
+"""The factors (c, r, w, v, m) of a state, most significant first."""
+
+
+@struct.dataclass
+class Factor:
+    """A factor of the surroundings with J levels (level 0 the favourable one in the paper)."""
+
+    prior: Float
+    """[J] tau_j, probability of each level, sums to 1; equation (3)."""
+    event_probability: Float
+    """[J] p_j, probability of an unexpected event at each level; equation (4)."""
+    persistence: Float
+    """[] kappa, probability that the level stays as it is instead of being drawn anew, in [0, 1)."""
+
+
+@struct.dataclass
+class EnvParams:
+    """Everything that defines one environment. `replace` on `radar` rebuilds its bank of placements."""
+
+    channel: Channel
+    road: Factor
+    weather: Factor
+    speed: Factor
+    nearby: Factor
+    radar: Radar
+    reward_weights: Float
+    """[4] (rho_1, rho_2, rho_3, rho_4) of equation (11)."""
+    event_model: Int
+    """[] index into EVENT_MODELS."""
+    miss_convention: Int
+    """[] index into MISS_CONVENTIONS."""
+    count_event_packets: Int
+    """[] 1 if packets sent in a slot with an event count as throughput, else 0."""
+    terminal_time_limit: Int
+    """[] 1 if the time limit is a terminal state, 0 if it truncates."""
+    max_steps_in_episode: int = struct.field(pytree_node=False, default=300)
+    """Slots per episode, static."""
+
+    @property
+    def factors(self) -> tuple[Channel | Factor, ...]:
+        """The five factors in the order of FACTORS."""
+        return tuple(getattr(self, name) for name in FACTORS)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Levels per factor."""
+        return tuple(factor.prior.shape[-1] for factor in self.factors)
+
+    @property
+    def num_states(self) -> int:
+        """S."""
+        return states.num_states(self.shape)
+
+    @property
+    def num_rates(self) -> int:
+        """L."""
+        return self.channel.packets.shape[-1]
+
+    @property
+    def num_actions(self) -> int:
+        """A = L + K: the data rates in ascending order, then the radar modes."""
+        return self.num_rates + self.radar.num_modes
+
+
+def make_factor(prior, event_probability, persistence: float = 0.0) -> Factor:
+    """A `Factor` from plain numbers."""
+    return Factor(*(jnp.asarray(x, jnp.float32) for x in (prior, event_probability, persistence)))

@@ -1,0 +1,249 @@
+"""The multi-mode radar: parameters, the miss-detection ratio of one slot (5), and the bank of placements.
+
+The bank holds the miss ratios of many independent placements per mode, so that a slot costs one look-up. It is part
+of `Radar` and is built anew whenever `Radar.replace` changes anything that it depends on; under `jit` and `vmap` it is
+built inside the same program.
+"""
+
+from __future__ import annotations
+
+import math
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from flax import struct
+
+from jrcjax import chirp, detection, rng
+from jrcjax.placement import ObjectClasses, object_count, place_objects
+from jrcjax.types import COUNT_MODELS, COUNTING_RULES, DISTANCES, PLACEMENTS, Float, Int, Key, Words, choice
+
+REFERENCE_SIDE = 45.0
+"""Side in m of the square in which the density omega counts objects."""
+_CHUNK = 256  # placements handled at once while a bank is built: about 10 MB of boxes
+
+
+@struct.dataclass
+class Radar:
+    """Parameters of K radar modes and of the objects around the vehicle."""
+
+    bandwidth: Float
+    """[K] sweep bandwidth b in Hz."""
+    slope: Float
+    """[K] chirp slope f_c in Hz/s."""
+    max_intermediate_frequency: Float
+    """[K] F_max in Hz."""
+    density: Float
+    """[] omega, mean number of objects per 45 m x 45 m."""
+    class_share: Float
+    """[C] shares of the classes of objects, sum 1."""
+    size_mean: Float
+    """[C, 2] mean length and width in m."""
+    size_std: Float
+    """[C, 2] standard deviation of length and width in m."""
+    distance: Int
+    """[] index into DISTANCES."""
+    counting_rule: Int
+    """[] index into COUNTING_RULES."""
+    count_model: Int
+    """[] index into COUNT_MODELS."""
+    bank_seed: Int
+    """[] seed of the bank's placements."""
+    miss_bank: Float
+    """[K, B] miss ratios of B independent placements per mode; derived, see `replace`."""
+    max_objects: tuple[int, ...] = struct.field(pytree_node=False)
+    """K slots for objects; a count above it gives NaN, never a silently smaller number."""
+    placements: str = struct.field(pytree_node=False, default="bank")
+    """One of PLACEMENTS: a slot draws from the bank, or places its objects afresh."""
+
+    @property
+    def num_modes(self) -> int:
+        """K."""
+        return self.bandwidth.shape[-1]
+
+    @property
+    def classes(self) -> ObjectClasses:
+        """Shares and sizes of the classes of objects."""
+        return ObjectClasses(self.class_share, self.size_mean, self.size_std)
+
+
+def _replace(self: Radar, **changes) -> Radar:
+    """A copy with the given fields changed and a bank that fits them.
+
+    Inside `jit` or `vmap`, where a density has no value, `max_objects` stays as it is.
+    """
+    new = struct.dataclasses.replace(self, **changes)
+    if changes.keys() <= {"miss_bank", "max_objects", "placements"}:
+        return new
+    if "max_objects" not in changes:
+        new = struct.dataclasses.replace(new, max_objects=_capacities(new))
+    return struct.dataclasses.replace(new, miss_bank=build_bank(new, self.miss_bank.shape[-1]))
+
+
+Radar.replace = _replace  # after the class, because flax's decorator sets a `replace` of its own
+
+
+def make_radar(
+    *,
+    bandwidth,
+    slope,
+    max_intermediate_frequency,
+    density: float,
+    class_share,
+    size_mean,
+    size_std,
+    distance: str = "footprint_gap",
+    counting_rule: str = "resolved",
+    count_model: str = "fixed",
+    placements: str = "bank",
+    bank_size: int = 4096,
+    bank_seed: int = 0,
+    max_density: float | None = None,
+) -> Radar:
+    """Builds a `Radar` and its bank; arguments as the fields, readings by name.
+
+    Args:
+      bank_size: B, number of placements per mode.
+      max_density: largest density that `replace` may set under `vmap`; the density itself if None.
+
+    Raises:
+      ValueError: naming the field, the value and what is allowed.
+    """
+    choice("radar.placements", placements, PLACEMENTS)
+    if not isinstance(bank_size, int) or bank_size < 1:
+        raise ValueError(f"radar.bank_size: {bank_size!r}; allowed: an integer >= 1")
+    as_float = lambda value: jnp.asarray(value, jnp.float32)  # noqa: E731
+    radar = Radar(
+        bandwidth=as_float(bandwidth),
+        slope=as_float(slope),
+        max_intermediate_frequency=as_float(max_intermediate_frequency),
+        density=as_float(density),
+        class_share=as_float(class_share),
+        size_mean=as_float(size_mean),
+        size_std=as_float(size_std),
+        distance=jnp.int32(choice("radar.distance", distance, DISTANCES)),
+        counting_rule=jnp.int32(choice("radar.counting_rule", counting_rule, COUNTING_RULES)),
+        count_model=jnp.int32(choice("radar.count_model", count_model, COUNT_MODELS)),
+        bank_seed=jnp.int32(bank_seed),
+        miss_bank=jnp.zeros((np.shape(bandwidth)[-1] if np.ndim(bandwidth) else 0, bank_size)),
+        max_objects=(),
+        placements=placements,
+    )
+    from jrcjax.checks import check_radar  # checks know every container, so they are imported late
+
+    check_radar(radar)
+    radar = struct.dataclasses.replace(radar, max_objects=_capacities(radar, max_density))
+    return struct.dataclasses.replace(radar, miss_bank=build_bank(radar, bank_size))
+
+
+def mean_count(radar: Radar) -> Float:
+    """Mean number of objects in the square of each mode, [K]: omega (R_max / 45 m)^2."""
+    reach = chirp.maximum_range(radar.slope, radar.max_intermediate_frequency)
+    return radar.density * (reach / REFERENCE_SIDE) ** 2
+
+
+def _capacities(radar: Radar, density: float | None = None) -> tuple[int, ...]:
+    """Slots that hold any fixed count, and a Poisson count but for a chance below 1e-12."""
+    if isinstance(radar.density, jax.core.Tracer) or isinstance(radar.slope, jax.core.Tracer):
+        return radar.max_objects
+    with jax.ensure_compile_time_eval():
+        scale = 1.0 if density is None else max(density / float(radar.density), 1.0)
+        mean = np.asarray(mean_count(radar), np.float64) * scale
+    needed = [math.ceil(m + 8.0 * math.sqrt(m) + 8.0) for m in mean]
+    return tuple(max(pair) for pair in zip(needed, radar.max_objects or needed, strict=True))
+
+
+def fresh_miss_ratio(key: Key, mode: int, radar: Radar) -> Float:
+    """p_k of one new placement in mode `mode` (static), a scalar; equation (5)."""
+    count_key, place_key = jax.random.split(key)
+    count = object_count(count_key, mean_count(radar)[mode], radar.count_model)
+    side = chirp.maximum_range(radar.slope, radar.max_intermediate_frequency)[mode]
+    capacity = radar.max_objects[mode]
+    footprints = place_objects(place_key, count, side, radar.classes, capacity)
+    resolution = chirp.range_resolution(radar.bandwidth)[mode]
+    detected = detection.detected_objects(footprints, resolution, radar.distance, radar.counting_rule)
+    return jnp.where(count <= capacity, detection.miss_ratio(count, detected), jnp.nan)
+
+
+def miss_ratio(
+    key: Key,
+    density: Float | float,
+    mode: Int | int,
+    *,
+    distance: str = "footprint_gap",
+    rule: str = "resolved",
+    count: str = "fixed",
+    radar: Radar | None = None,
+) -> Float:
+    """p_k of one new placement, equation (5); vmappable over key, density and mode.
+
+    Args:
+      key: a PRNG key.
+      density: omega, mean number of objects per 45 m x 45 m.
+      mode: radar mode, 0 <= mode < K (0 is the long range, 1 the short range of the paper).
+      distance: one of DISTANCES.
+      rule: one of COUNTING_RULES.
+      count: one of COUNT_MODELS.
+      radar: modes and classes of objects; Table I's if None. Readings are taken from the arguments above.
+
+    Returns:
+      The miss ratio in [0, 1], a scalar; NaN if a traced density exceeds what `radar.max_objects` holds.
+
+    Raises:
+      ValueError: for an unknown reading, mode or a density that is not positive.
+    """
+    if radar is None:
+        from jrcjax.presets import paper_radar
+
+        radar = paper_radar()
+    radar = struct.dataclasses.replace(
+        radar,
+        density=jnp.asarray(density, jnp.float32),
+        distance=jnp.int32(choice("distance", distance, DISTANCES)),
+        counting_rule=jnp.int32(choice("rule", rule, COUNTING_RULES)),
+        count_model=jnp.int32(choice("count", count, COUNT_MODELS)),
+    )
+    if not isinstance(radar.density, jax.core.Tracer):
+        if not (np.isfinite(radar.density) and radar.density > 0):
+            raise ValueError(f"density: {density!r}; allowed: a finite number > 0")
+        radar = struct.dataclasses.replace(radar, max_objects=_capacities(radar))
+    if isinstance(mode, jax.core.Tracer) or isinstance(mode, jax.Array):
+        return jax.lax.switch(mode, [lambda k, m=m: fresh_miss_ratio(k, m, radar) for m in range(radar.num_modes)], key)
+    if not 0 <= mode < radar.num_modes:
+        raise ValueError(f"mode: {mode!r}; allowed: 0 to {radar.num_modes - 1}")
+    return _jitted_fresh(key, int(mode), radar)
+
+
+_jitted_fresh = jax.jit(fresh_miss_ratio, static_argnums=1)
+
+
+def build_bank(radar: Radar, size: int) -> Float:
+    """Miss ratios of `size` independent placements per mode, [K, size]."""
+    return _build_bank(struct.dataclasses.replace(radar, miss_bank=jnp.zeros((radar.num_modes, 0))), size)
+
+
+@jax.jit(static_argnums=1)
+def _build_bank(radar: Radar, size: int) -> Float:
+    def of_mode(mode: int) -> Float:
+        mode_key = jax.random.fold_in(jax.random.key(radar.bank_seed), mode)
+        keys = jax.vmap(lambda i: jax.random.fold_in(mode_key, i))(jnp.arange(size))
+        return jax.lax.map(lambda key: fresh_miss_ratio(key, mode, radar), keys, batch_size=min(size, _CHUNK))
+
+    return jnp.stack([of_mode(mode) for mode in range(radar.num_modes)])
+
+
+def slot_miss_ratio(word: Words, mode: Int, radar: Radar) -> Float:
+    """p_k(t) of one slot in mode `mode`, a scalar, from one random word.
+
+    Drawn from the bank, or from a placement made afresh; both have the same distribution over slots.
+    """
+    if radar.placements == "fresh":
+        modes = [lambda k, m=m: fresh_miss_ratio(k, m, radar) for m in range(radar.num_modes)]
+        return jax.lax.switch(mode, modes, jax.random.key(word))
+    bank = radar.miss_bank
+    return bank[mode, rng.index(word, bank.shape[-1])]
+
+
+def mean_miss_ratio(radar: Radar) -> Float:
+    """E[p_k] per mode, [K]: the mean of the bank that the slots draw from."""
+    return radar.miss_bank.mean(axis=-1)

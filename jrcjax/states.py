@@ -1,0 +1,41 @@
+"""State ids and factor levels: the paper's equation (8).
+
+An id counts in mixed radix with the channel as the most significant digit: with two levels each,
+(c, r, w, v, m) = (0, 0, 0, 0, 1) is state 1.
+"""
+
+from __future__ import annotations
+
+import math
+
+import jax.numpy as jnp
+
+from jrcjax.types import Float, Int
+
+
+def num_states(shape: tuple[int, ...]) -> int:
+    """Number of states for `shape` levels per factor."""
+    return math.prod(shape)
+
+
+def levels_of(state: Int, shape: tuple[int, ...]) -> Int:
+    """Levels (c, r, w, v, m) of state ids [...]; [..., F]."""
+    levels = []
+    for size in reversed(shape):
+        levels.append(state % size)
+        state = state // size
+    return jnp.stack(levels[::-1], axis=-1)
+
+
+def id_of(levels: Int, shape: tuple[int, ...]) -> Int:
+    """State ids [...] of levels [..., F]."""
+    state = jnp.zeros_like(levels[..., 0])
+    for factor, size in enumerate(shape):
+        state = state * size + levels[..., factor]
+    return state
+
+
+def features_of(state: Int, shape: tuple[int, ...]) -> Float:
+    """What an agent observes in states [...]: each level scaled to [0, 1]; [..., F] float32."""
+    largest = jnp.maximum(jnp.asarray(shape, jnp.float32) - 1.0, 1.0)
+    return levels_of(state, shape).astype(jnp.float32) / largest

@@ -1,0 +1,36 @@
+"""Temporal-difference targets and losses, one function an equation (the paper's section V).
+
+Functions work on tables over all states, [S, A], or on rows of a batch, [B, A]; gathering by ids is the caller's.
+"""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+
+from jrcjax.types import Float, Int
+
+
+def double_q_value(q_online: Float, q_target: Float) -> Float:
+    """Q(s', argmax_a Q(s', a; theta); theta'), the value in equation (15); [N, A], [N, A] to [N]."""
+    best = jnp.argmax(q_online, axis=-1, keepdims=True)
+    return jnp.take_along_axis(q_target, best, axis=-1)[..., 0]
+
+
+def td_target(reward: Float, discount: Float, next_value: Float) -> Float:
+    """y = rho + gamma V(s'), equation (15); `discount` is 0 where the episode ended for good."""
+    return reward + discount * next_value
+
+
+def squared_td_loss(td_error: Float) -> Float:
+    """Mean of (y - Q)^2 over the mini-batch [B], equations (16) and (20)."""
+    return jnp.mean(jnp.square(td_error))
+
+
+def q_learning_error(q: Float, state: Int, action: Int, reward: Float, next_state: Int, discount: Float) -> Float:
+    """rho + gamma max_a Q(s', a) - Q(s, a), the bracket in equation (13), for a table q [S, A]."""
+    return td_target(reward, discount, q[next_state].max()) - q[state, action]
+
+
+def robbins_monro_step(visits: Int, exponent: Float) -> Float:
+    """Step size n^-exponent after n >= 1 visits; satisfies equation (14) for exponents in (0.5, 1]."""
+    return jnp.maximum(visits, 1).astype(jnp.float32) ** -exponent
