@@ -5,10 +5,9 @@ with Joint Radar-Data Communications" (arXiv:2105.13670), called the paper throu
 """
 
 from jrcjax import events, exact, radar
-from jrcjax.checks import check_params
 from jrcjax.environment import EnvState, JRCEnv
 from jrcjax.hparams import Config, HParams
-from jrcjax.params import EnvParams
+from jrcjax.params import EnvParams, check_params
 from jrcjax.presets import paper_params
 from jrcjax.training import AgentState, Log, train
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import jax.numpy as jnp
+import numpy as np
 from flax import struct
 
+from jrcjax.checks import is_ascending, is_distribution, is_not_negative, is_positive, require
 from jrcjax.types import Float, Int
 
 
@@ -37,3 +39,22 @@ def delivered_packets(level: Int, rate: Int, channel: Channel) -> Float:
     """Packets that reach the base station in one slot, a scalar: all of the rate's or none."""
     decodes = sinr(channel)[level] >= channel.sinr_threshold[rate]
     return jnp.where(decodes, channel.packets[rate], 0.0)
+
+
+def check_dynamics(name: str, prior: Float, persistence: Float) -> None:
+    """Checks what channel and factors share: the prior [J], equation (3), and the persistence []."""
+    require(f"{name}.prior", prior, (None,), is_distribution, "probabilities in [0, 1] that sum to 1")
+    require(f"{name}.persistence", persistence, (), lambda x: (x >= 0) & (x < 1), "a number in [0, 1)")
+
+
+def check_channel(channel: Channel) -> None:
+    """Raises ValueError naming the field, the value and what is allowed."""
+    check_dynamics("channel", channel.prior, channel.persistence)
+    levels, rates = np.shape(channel.prior)[-1], np.shape(channel.packets)[-1] if np.ndim(channel.packets) else None
+    require("channel.received_power", channel.received_power, (), is_positive, "a power > 0 W")
+    require("channel.interference", channel.interference, (levels,), is_not_negative, "one power >= 0 W per level")
+    require("channel.noise", channel.noise, (), is_positive, "a power > 0 W")
+    require("channel.packets", channel.packets, (None,), is_not_negative, "one number >= 0 per data rate")
+    require(
+        "channel.sinr_threshold", channel.sinr_threshold, (rates,), is_ascending, "one ratio > 0 per rate, ascending"
+    )

@@ -109,9 +109,9 @@ def _over_near_pairs(box: Boxes, resolution: Float, combine: Callable, initial: 
         shift, values = carry
         gap_x = jnp.maximum(jnp.abs(_late(x, shift, n) - box.x) - _late(half_x, shift, n) - box.half_x, 0.0)
         gap_y = jnp.maximum(jnp.abs(_late(y, shift, n) - box.y) - _late(half_y, shift, n) - box.half_y, 0.0)
-        # Beyond reach the squares could overflow, and nothing there is near.
-        near = (gap_y <= resolution[..., None]) & (gap_x**2 + jnp.minimum(gap_y, 1e6) ** 2 <= resolution[..., None] ** 2)
-        return shift + 1, combine(values, near, shift)
+        # Absent objects are so far away that a square could overflow.
+        gap = jnp.square(gap_x) + jnp.square(jnp.minimum(gap_y, 1e6))
+        return shift + 1, combine(values, gap <= jnp.square(resolution)[..., None], shift)
 
     return jax.lax.while_loop(some_in_reach, compare, (jnp.int32(1), jnp.pad(initial, pad)))[1][..., :n]
 
@@ -133,7 +133,6 @@ def _shared_loop(function: Callable) -> Callable:
 @_shared_loop
 def is_merged(box: Boxes, resolution: Float) -> Bool:
     """Which objects are unresolved from at least one other; [..., N] for boxes [..., N], resolution [...]."""
-
     n = box.x.shape[-1]
 
     def mark(merged, near, shift):

@@ -27,7 +27,7 @@ def noisy_or(at_level: Float) -> Float:
 
 def event_probability_at(levels: Int, params: EnvParams) -> Float:
     """p_u in the state with levels [F], a scalar. The channel causes no events."""
-    surroundings = params.factors[1:]
+    surroundings = params.surroundings
     at_level = jnp.stack([f.event_probability[level] for f, level in zip(surroundings, levels[1:], strict=True)])
     prior_mean = jnp.stack([jnp.sum(f.prior * f.event_probability) for f in surroundings])
     readings = jnp.stack([conditional(at_level), marginal(prior_mean), noisy_or(at_level)])

@@ -77,7 +77,10 @@ def expected_reward(params: EnvParams) -> Float:
     """E[rho | s, a], [S, A]; equation (11) averaged over event and placement, in both of which it is linear."""
     p = event_probability(params)[:, None]
     packets = packet_table(params)
-    given = [reward(_is_data(params), event, packets, miss_table(params), params.reward_weights) for event in (True, False)]
+    given = [
+        reward(_is_data(params), jnp.bool_(event), packets, miss_table(params), params.reward_weights)
+        for event in (True, False)
+    ]
     return p * given[0] + (1.0 - p) * given[1]
 
 
@@ -148,13 +151,11 @@ def evaluate_policy(params: EnvParams, policy: Float) -> LongRun:
     visits = stationary_distribution(params)[:, None] * policy
     p = event_probability(params)[:, None]
     packets, miss, is_data = packet_table(params), miss_table(params), _is_data(params)
-    by_event = ((True, p), (False, 1.0 - p))
-    throughput = sum(
-        (visits * q * metrics.counted_packets(packets, jnp.bool_(event), params.count_event_packets)).sum()
-        for event, q in by_event
-    )
-    counted = [
-        visits * q * metrics.counts_for_miss(is_data, jnp.bool_(event), params.miss_convention) for event, q in by_event
-    ]
-    sums = metrics.zero()._replace(missed=sum((c * miss).sum() for c in counted), counted=sum(c.sum() for c in counted))
+    throughput, missed, counted = jnp.float32(0.0), jnp.float32(0.0), jnp.float32(0.0)
+    for event, chance in ((jnp.bool_(True), p), (jnp.bool_(False), 1.0 - p)):
+        weight = visits * chance
+        throughput += (weight * metrics.counted_packets(packets, event, params.count_event_packets)).sum()
+        counts = weight * metrics.counts_for_miss(is_data, event, params.miss_convention)
+        missed, counted = missed + (counts * miss).sum(), counted + counts.sum()
+    sums = metrics.zero()._replace(missed=missed, counted=counted)
     return LongRun((visits * expected_reward(params)).sum(), throughput, metrics.miss_detection(sums))

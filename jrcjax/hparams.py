@@ -105,11 +105,17 @@ def check_config(config: Config) -> None:
     for name in ("episodes", "batch_size", "replay_capacity"):
         value = getattr(config, name)
         if not isinstance(value, int) or isinstance(value, bool) or not 1 <= value < 2**31:
-            refuse(f"config.{name}", value if isinstance(value, int | float) else str(value), "an integer from 1 to 2^31 - 1")
+            refuse(
+                f"config.{name}",
+                value if isinstance(value, int | float) else str(value),
+                "an integer from 1 to 2^31 - 1",
+            )
     if not isinstance(config.hidden, tuple) or not all(isinstance(w, int) and w >= 1 for w in config.hidden):
         refuse("config.hidden", str(config.hidden), "a tuple of integers >= 1")
     known = isinstance(config.optimiser, optax.GradientTransformation) or config.optimiser in OPTIMISERS
     if not known:
-        refuse("config.optimiser", str(config.optimiser), f"{', '.join(map(repr, OPTIMISERS))}, or an optax transformation")
+        refuse(
+            "config.optimiser", str(config.optimiser), f"{', '.join(map(repr, OPTIMISERS))}, or an optax transformation"
+        )
     if config.form not in FORMS:
         refuse("config.form", str(config.form), ", ".join(map(repr, FORMS)))

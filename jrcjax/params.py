@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import jax.numpy as jnp
+import numpy as np
 from flax import struct
 
 from jrcjax import states
-from jrcjax.channel import Channel
-from jrcjax.radar import Radar
-from jrcjax.types import Float, Int
+from jrcjax.channel import Channel, check_channel, check_dynamics
+from jrcjax.checks import is_not_negative, is_probability, refuse, require, require_reading
+from jrcjax.radar import Radar, check_radar
+from jrcjax.types import EVENT_MODELS, MISS_CONVENTIONS, Float, Int
 
 FACTORS = ("channel", "road", "weather", "speed", "nearby")
 """The factors (c, r, w, v, m) of a state, most significant first."""
@@ -52,7 +54,12 @@ class EnvParams:
     @property
     def factors(self) -> tuple[Channel | Factor, ...]:
         """The five factors in the order of FACTORS."""
-        return tuple(getattr(self, name) for name in FACTORS)
+        return (self.channel, *self.surroundings)
+
+    @property
+    def surroundings(self) -> tuple[Factor, ...]:
+        """The factors that cause events, that is all but the channel."""
+        return (self.road, self.weather, self.speed, self.nearby)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -78,3 +85,32 @@ class EnvParams:
 def make_factor(prior, event_probability, persistence: float = 0.0) -> Factor:
     """A `Factor` from plain numbers."""
     return Factor(*(jnp.asarray(x, jnp.float32) for x in (prior, event_probability, persistence)))
+
+
+def check_factor(name: str, factor: Factor) -> None:
+    """Raises ValueError naming the field, the value and what is allowed."""
+    check_dynamics(name, factor.prior, factor.persistence)
+    shape = (np.shape(factor.prior)[-1],)
+    require(f"{name}.event_probability", factor.event_probability, shape, is_probability, "one of [0, 1] per level")
+
+
+def check_params(params: EnvParams) -> None:
+    """Checks environment parameters.
+
+    Raises:
+      ValueError: naming the field, the value and what is allowed.
+    """
+    if not isinstance(params, EnvParams):
+        raise ValueError(f"params: {type(params).__name__}; allowed: EnvParams, as paper_params returns it")
+    check_channel(params.channel)
+    for name in FACTORS[1:]:
+        check_factor(name, getattr(params, name))
+    check_radar(params.radar)
+    require("reward_weights", params.reward_weights, (4,), is_not_negative, "four weights >= 0 (rho_1 to rho_4)")
+    require_reading("event_model", params.event_model, EVENT_MODELS)
+    require_reading("miss_convention", params.miss_convention, MISS_CONVENTIONS)
+    require("count_event_packets", params.count_event_packets, (), lambda x: np.isin(x, (0, 1)), "0 or 1")
+    require("terminal_time_limit", params.terminal_time_limit, (), lambda x: np.isin(x, (0, 1)), "0 or 1")
+    limit = params.max_steps_in_episode
+    if not isinstance(limit, int) or isinstance(limit, bool) or limit < 1:
+        refuse("max_steps_in_episode", str(limit), "an integer >= 1")

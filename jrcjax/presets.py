@@ -9,8 +9,7 @@ import jax.numpy as jnp
 
 from jrcjax import chirp
 from jrcjax.channel import Channel
-from jrcjax.checks import check_params
-from jrcjax.params import EnvParams, make_factor
+from jrcjax.params import EnvParams, check_params, make_factor
 from jrcjax.radar import Radar, make_radar
 from jrcjax.types import EVENT_MODELS, MISS_CONVENTIONS, choice
 

@@ -7,6 +7,8 @@ built inside the same program.
 
 from __future__ import annotations
 
+import dataclasses
+import functools
 import math
 
 import jax
@@ -15,6 +17,7 @@ import numpy as np
 from flax import struct
 
 from jrcjax import chirp, detection, rng
+from jrcjax.checks import is_distribution, is_not_negative, is_positive, is_traced, refuse, require, require_reading
 from jrcjax.placement import ObjectClasses, object_count, place_objects
 from jrcjax.types import COUNT_MODELS, COUNTING_RULES, DISTANCES, PLACEMENTS, Float, Int, Key, Words, choice
 
@@ -72,15 +75,16 @@ def _replace(self: Radar, **changes) -> Radar:
 
     Inside `jit` or `vmap`, where a density has no value, `max_objects` stays as it is.
     """
-    new = struct.dataclasses.replace(self, **changes)
+    new = dataclasses.replace(self, **changes)
     if changes.keys() <= {"miss_bank", "max_objects", "placements"}:
         return new
     if "max_objects" not in changes:
-        new = struct.dataclasses.replace(new, max_objects=_capacities(new))
-    return struct.dataclasses.replace(new, miss_bank=build_bank(new, self.miss_bank.shape[-1]))
+        new = dataclasses.replace(new, max_objects=_capacities(new))
+    return dataclasses.replace(new, miss_bank=build_bank(new, self.miss_bank.shape[-1]))
 
 
-Radar.replace = _replace  # after the class, because flax's decorator sets a `replace` of its own
+# After the class, because flax's decorator sets a `replace` of its own.
+Radar.replace = _replace  # pyright: ignore[reportAttributeAccessIssue]
 
 
 def make_radar(
@@ -102,9 +106,8 @@ def make_radar(
 ) -> Radar:
     """Builds a `Radar` and its bank; arguments as the fields, readings by name.
 
-    Args:
-      bank_size: B, number of placements per mode.
-      max_density: largest density that `replace` may set under `vmap`; the density itself if None.
+    `bank_size` is B, the number of placements per mode, and `max_density` the largest density that `replace` may set
+    under `vmap` (the density itself if None).
 
     Raises:
       ValueError: naming the field, the value and what is allowed.
@@ -129,11 +132,9 @@ def make_radar(
         max_objects=(),
         placements=placements,
     )
-    from jrcjax.checks import check_radar  # checks know every container, so they are imported late
-
     check_radar(radar)
-    radar = struct.dataclasses.replace(radar, max_objects=_capacities(radar, max_density))
-    return struct.dataclasses.replace(radar, miss_bank=build_bank(radar, bank_size))
+    radar = dataclasses.replace(radar, max_objects=_capacities(radar, max_density))
+    return dataclasses.replace(radar, miss_bank=build_bank(radar, bank_size))
 
 
 def mean_count(radar: Radar) -> Float:
@@ -144,7 +145,7 @@ def mean_count(radar: Radar) -> Float:
 
 def _capacities(radar: Radar, density: float | None = None) -> tuple[int, ...]:
     """Slots that hold any fixed count, and a Poisson count but for a chance below 1e-12."""
-    if isinstance(radar.density, jax.core.Tracer) or isinstance(radar.slope, jax.core.Tracer):
+    if is_traced(radar.density, radar.slope, radar.max_intermediate_frequency):
         return radar.max_objects
     with jax.ensure_compile_time_eval():
         scale = 1.0 if density is None else max(density / float(radar.density), 1.0)
@@ -163,6 +164,12 @@ def fresh_miss_ratio(key: Key, mode: int, radar: Radar) -> Float:
     resolution = chirp.range_resolution(radar.bandwidth)[mode]
     detected = detection.detected_objects(footprints, resolution, radar.distance, radar.counting_rule)
     return jnp.where(count <= capacity, detection.miss_ratio(count, detected), jnp.nan)
+
+
+def _fresh_of(key: Key, mode: Int, radar: Radar) -> Float:
+    """`fresh_miss_ratio` for a mode that is an array; a mode's number of slots is static, so each has its branch."""
+    modes = [functools.partial(fresh_miss_ratio, mode=m, radar=radar) for m in range(radar.num_modes)]
+    return jax.lax.switch(mode, modes, key)
 
 
 def miss_ratio(
@@ -196,19 +203,19 @@ def miss_ratio(
         from jrcjax.presets import paper_radar
 
         radar = paper_radar()
-    radar = struct.dataclasses.replace(
+    radar = dataclasses.replace(
         radar,
         density=jnp.asarray(density, jnp.float32),
         distance=jnp.int32(choice("distance", distance, DISTANCES)),
         counting_rule=jnp.int32(choice("rule", rule, COUNTING_RULES)),
         count_model=jnp.int32(choice("count", count, COUNT_MODELS)),
     )
-    if not isinstance(radar.density, jax.core.Tracer):
+    if not is_traced(radar.density):
         if not (np.isfinite(radar.density) and radar.density > 0):
             raise ValueError(f"density: {density!r}; allowed: a finite number > 0")
-        radar = struct.dataclasses.replace(radar, max_objects=_capacities(radar))
-    if isinstance(mode, jax.core.Tracer) or isinstance(mode, jax.Array):
-        return jax.lax.switch(mode, [lambda k, m=m: fresh_miss_ratio(k, m, radar) for m in range(radar.num_modes)], key)
+        radar = dataclasses.replace(radar, max_objects=_capacities(radar))
+    if isinstance(mode, jax.Array):
+        return _fresh_of(key, mode, radar)
     if not 0 <= mode < radar.num_modes:
         raise ValueError(f"mode: {mode!r}; allowed: 0 to {radar.num_modes - 1}")
     return _jitted_fresh(key, int(mode), radar)
@@ -219,7 +226,7 @@ _jitted_fresh = jax.jit(fresh_miss_ratio, static_argnums=1)
 
 def build_bank(radar: Radar, size: int) -> Float:
     """Miss ratios of `size` independent placements per mode, [K, size]."""
-    return _build_bank(struct.dataclasses.replace(radar, miss_bank=jnp.zeros((radar.num_modes, 0))), size)
+    return _build_bank(dataclasses.replace(radar, miss_bank=jnp.zeros((radar.num_modes, 0))), size)
 
 
 @jax.jit(static_argnums=1)
@@ -238,8 +245,7 @@ def slot_miss_ratio(word: Words, mode: Int, radar: Radar) -> Float:
     Drawn from the bank, or from a placement made afresh; both have the same distribution over slots.
     """
     if radar.placements == "fresh":
-        modes = [lambda k, m=m: fresh_miss_ratio(k, m, radar) for m in range(radar.num_modes)]
-        return jax.lax.switch(mode, modes, jax.random.key(word))
+        return _fresh_of(jax.random.key(word), mode, radar)
     bank = radar.miss_bank
     return bank[mode, rng.index(word, bank.shape[-1])]
 
@@ -247,3 +253,37 @@ def slot_miss_ratio(word: Words, mode: Int, radar: Radar) -> Float:
 def mean_miss_ratio(radar: Radar) -> Float:
     """E[p_k] per mode, [K]: the mean of the bank that the slots draw from."""
     return radar.miss_bank.mean(axis=-1)
+
+
+def check_radar(radar: Radar) -> None:
+    """Raises ValueError naming the field, the value and what is allowed."""
+    require("radar.bandwidth", radar.bandwidth, (None,), is_positive, "one frequency > 0 Hz per radar mode")
+    modes = np.shape(radar.bandwidth)
+    require("radar.slope", radar.slope, modes, is_positive, "one slope > 0 Hz/s per radar mode")
+    field = "radar.max_intermediate_frequency"
+    require(field, radar.max_intermediate_frequency, modes, is_positive, "one frequency > 0 Hz per radar mode")
+    require("radar.density", radar.density, (), is_positive, "a number of objects > 0 per 45 m x 45 m")
+    share = "probabilities in [0, 1] that sum to 1, one per class of objects"
+    require("radar.class_share", radar.class_share, (None,), is_distribution, share)
+    classes = np.shape(radar.class_share)[0]
+    require("radar.size_mean", radar.size_mean, (classes, 2), is_positive, "length and width > 0 m per class")
+    require("radar.size_std", radar.size_std, (classes, 2), is_not_negative, "deviations >= 0 m per class")
+    require_reading("radar.distance", radar.distance, DISTANCES)
+    require_reading("radar.counting_rule", radar.counting_rule, COUNTING_RULES)
+    require_reading("radar.count_model", radar.count_model, COUNT_MODELS)
+    require("radar.bank_seed", radar.bank_seed, (), is_not_negative, "an integer >= 0")
+    if radar.placements not in PLACEMENTS:
+        refuse("radar.placements", radar.placements, ", ".join(map(repr, PLACEMENTS)))
+    require("radar.miss_bank", radar.miss_bank, (*modes, None), lambda x: True, "the bank that `replace` builds")
+    _check_count(radar)
+
+
+def _check_count(radar: Radar) -> None:
+    if is_traced(radar.density, radar.slope, radar.max_intermediate_frequency):
+        return
+    with jax.ensure_compile_time_eval():
+        counts = np.asarray(mean_count(radar))
+    if not (np.round(counts) >= 1).all():
+        refuse("radar.density", float(radar.density), f"at least one object in every mode, not {counts.tolist()}")
+    if radar.max_objects and (len(radar.max_objects) != len(counts) or (counts > radar.max_objects).any()):
+        refuse("radar.max_objects", list(radar.max_objects), f"one per mode, at least {np.ceil(counts).tolist()}")

@@ -10,5 +10,5 @@ from jrcjax.types import Float, Int
 
 def epsilon(slot: Int, hparams: HParams) -> Float:
     """Probability of a random action in slot `slot` (from 0): linear, then constant."""
-    progress = jnp.minimum(slot / hparams.epsilon_slots, 1.0)
+    progress = jnp.minimum(jnp.asarray(slot, jnp.float32) / hparams.epsilon_slots, 1.0)
     return hparams.epsilon_start + progress * (hparams.epsilon_end - hparams.epsilon_start)

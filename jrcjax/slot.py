@@ -72,5 +72,5 @@ def measure(sums: metrics.Metrics, outcome: Outcome, params: EnvParams) -> metri
         reward=sums.reward + outcome.reward,
         packets=sums.packets + metrics.counted_packets(outcome.packets, outcome.event, params.count_event_packets),
         missed=sums.missed + jnp.where(counts, outcome.miss_ratio, 0.0),
-        counted=sums.counted + counts,
+        counted=sums.counted + counts.astype(jnp.float32),
     )

@@ -37,5 +37,6 @@ def id_of(levels: Int, shape: tuple[int, ...]) -> Int:
 
 def features_of(state: Int, shape: tuple[int, ...]) -> Float:
     """What an agent observes in states [...]: each level scaled to [0, 1]; [..., F] float32."""
+    levels = levels_of(state, shape).astype(jnp.float32)
     largest = jnp.maximum(jnp.asarray(shape, jnp.float32) - 1.0, 1.0)
-    return levels_of(state, shape).astype(jnp.float32) / largest
+    return levels / jnp.broadcast_to(largest, levels.shape)

@@ -12,11 +12,10 @@ import jax
 import jax.numpy as jnp
 
 from jrcjax import exploration, metrics, slot
-from jrcjax.checks import check_params
 from jrcjax.exact import evaluate_policy
 from jrcjax.hparams import Config, HParams, check_config, check_hparams
 from jrcjax.learners import Learner, LearnerFactory, Spec, make_learner
-from jrcjax.params import EnvParams
+from jrcjax.params import EnvParams, check_params
 from jrcjax.replay import Transition
 from jrcjax.types import Float, Int, Key, Words
 

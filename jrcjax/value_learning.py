@@ -17,7 +17,7 @@ def double_q_value(q_online: Float, q_target: Float) -> Float:
 
 
 def td_target(reward: Float, discount: Float, next_value: Float) -> Float:
-    """y = rho + gamma V(s'), equation (15); `discount` is 0 where the episode ended for good."""
+    """The target y = rho + gamma V(s'), equation (15); `discount` is 0 where the episode ended for good."""
     return reward + discount * next_value
 
 
@@ -27,7 +27,7 @@ def squared_td_loss(td_error: Float) -> Float:
 
 
 def q_learning_error(q: Float, state: Int, action: Int, reward: Float, next_state: Int, discount: Float) -> Float:
-    """rho + gamma max_a Q(s', a) - Q(s, a), the bracket in equation (13), for a table q [S, A]."""
+    """The error rho + gamma max_a Q(s', a) - Q(s, a), the bracket in equation (13), for a table q [S, A]."""
     return td_target(reward, discount, q[next_state].max()) - q[state, action]
 
 

@@ -54,7 +54,7 @@ def table_loss(q: Float, q_target: Float, batch: Transition, discount: Float) ->
     """Equation (16) on tables [S, A] of the online and the target network, for a batch of ids [B]."""
     frozen = jax.lax.stop_gradient(q)
     next_value = double_q_value(frozen, q_target).at[batch.next_state].get(mode="promise_in_bounds")
-    y = td_target(batch.reward, discount * (1 - batch.terminal), next_value)
+    y = td_target(batch.reward, jnp.where(batch.terminal == 1, 0.0, discount), next_value)
     chosen = q.at[batch.state, batch.action].get(mode="promise_in_bounds")
     return squared_td_loss(y - chosen)
 
@@ -62,10 +62,8 @@ def table_loss(q: Float, q_target: Float, batch: Transition, discount: Float) ->
 def rows_loss(function: QFunction, weights: Any, target: Any, batch: Transition, discount: Float) -> Float:
     """Equation (16) with the network evaluated on the batch's rows, for models with too many states for a table."""
     frozen = jax.lax.stop_gradient(weights)
-    next_value = double_q_value(
-        function.values(frozen, batch.next_state), function.values(target, batch.next_state)
-    )
-    y = td_target(batch.reward, discount * (1 - batch.terminal), next_value)
+    next_value = double_q_value(function.values(frozen, batch.next_state), function.values(target, batch.next_state))
+    y = td_target(batch.reward, jnp.where(batch.terminal == 1, 0.0, discount), next_value)
     chosen = jnp.take_along_axis(function.values(weights, batch.state), batch.action[:, None], axis=1)[:, 0]
     return squared_td_loss(y - chosen)
 

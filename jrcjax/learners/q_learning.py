@@ -42,7 +42,7 @@ def q_learning(spec: Spec, config: Config) -> Learner:
         visits = state.visits.at[s, a].add(1)
         counted = robbins_monro_step(visits[s, a], hparams.step_exponent)
         step = jnp.where(hparams.step_constant > 0, hparams.step_constant, counted)
-        discount = hparams.discount * (1 - terminal)
+        discount = jnp.where(terminal == 1, 0.0, hparams.discount)
         error = q_learning_error(state.q, s, a, reward, next_state, discount)
         return QState(state.q.at[s, a].add(step * error), visits)
 

@@ -1,0 +1,91 @@
+"""Command line: `python -m paper_figs` runs what is missing and draws the figures."""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+from rich.console import Console
+
+from sweeps.sweep import Size, size_of
+
+
+@dataclass(frozen=True)
+class Options:
+    """Regenerates the paper's figures: PDF, PNG and CSV each, claims.json and report.html."""
+
+    only: tuple[int, ...] = ()
+    """Numbers of the figures to draw. Default: all."""
+    seeds: int | None = None
+    """Independent seeds. Default: 10, or 2 with --smoke."""
+    episodes: int | None = None
+    """Episodes per seed. Default: 1000, or 20 with --smoke."""
+    out: Path | None = None
+    """Folder for the figures; results go to its folder `results` and are used again. Default: out, or out/smoke."""
+    smoke: bool = False
+    """A tiny version of everything."""
+    preset: str = "paper"
+    """Table of parameters: paper or paper_table."""
+
+
+def make_figures(numbers: tuple[int, ...], size: Size, out: Path, console: Console) -> list[Path]:
+    """Runs the sweeps that are missing, then writes all files of the figures with these numbers.
+
+    Raises:
+      ValueError: unknown figures, bad sizes, or results of another configuration in `out`.
+    """
+    from paper_figs import claims, report, style
+    from paper_figs.figures import FIGURES, NUMBERS
+    from sweeps import store
+    from sweeps.registry import SWEEPS
+    from sweeps.run import run_sweep
+
+    unknown = sorted(set(numbers) - set(NUMBERS))
+    if unknown:
+        raise ValueError(f"only: {unknown}; allowed: {', '.join(map(str, NUMBERS))}")
+    size.check()
+    out.mkdir(parents=True, exist_ok=True)
+    wanted = [figure for figure in FIGURES if not numbers or figure.number in numbers]
+    written, pictures, judgements, optima, manifests = [], {}, [], [], {}
+    for figure in wanted:
+        folder = run_sweep(SWEEPS[figure.sweep], size, out / "results", console, resume=True)
+        data = store.load(folder, size.seeds)
+        table = figure.table(data)
+        table.to_csv(out / f"{figure.name}.csv", index=False, float_format="%.6g")
+        files = style.save(figure.draw(table, figure.title), out / figure.name)
+        written += [out / f"{figure.name}.csv", *files]
+        pictures[figure.title] = files[-1]
+        judgements += figure.claims(data)
+        optima += report.optimum_rows(figure.sweep, data)
+        manifests[figure.sweep] = (folder / store.MANIFEST).read_text()
+    page = report.render(size, pictures, judgements, optima, manifests)
+    texts = {"claims.json": json.dumps(claims.as_json(judgements), indent=2) + "\n", "report.html": page}
+    for name, text in texts.items():
+        (out / name).write_text(text)
+        written.append(out / name)
+    return written
+
+
+def main(args: list[str] | None = None) -> int:
+    """Entry point; returns the exit status."""
+    options = tyro.cli(Options, prog="python -m paper_figs", args=args)
+    from jrcjax import parallel  # after parsing, so that --help and errors come at once
+
+    parallel.use_all_cores()
+    parallel.keep_compiled()
+    out = options.out or Path("out/smoke" if options.smoke else "out")
+    try:
+        size = size_of(options.seeds, options.episodes, options.preset, options.smoke)
+        written = make_figures(options.only, size, out, Console(stderr=True))
+    except (ValueError, OSError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    print("\n".join(map(str, written)))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""Sweeps: files of constants, and the runner that turns them into results on disk. Nothing here draws."""

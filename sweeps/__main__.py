@@ -1,0 +1,72 @@
+"""Command line: `python -m sweeps list` and `python -m sweeps run NAME`."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+from rich.console import Console
+
+from sweeps.sweep import size_of
+
+
+@dataclass(frozen=True)
+class List:
+    """List the sweeps."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """Run one sweep; results go to OUT/NAME."""
+
+    name: tyro.conf.Positional[str]
+    """A sweep's name, as `list` shows it."""
+    seeds: int | None = None
+    """Independent seeds. Default: 10, or 2 with --smoke."""
+    episodes: int | None = None
+    """Episodes per seed. Default: 1000, or 20 with --smoke."""
+    preset: str = "paper"
+    """Table of parameters: paper or paper_table."""
+    out: Path = Path("out/results")
+    """Folder for results."""
+    resume: bool = False
+    """Continue where an earlier run with the same configuration stopped."""
+    smoke: bool = False
+    """A tiny version of the sweep."""
+
+
+Command = Annotated[List, tyro.conf.subcommand("list")] | Annotated[Run, tyro.conf.subcommand("run")]
+
+
+def main(args: list[str] | None = None) -> int:
+    """Entry point; returns the exit status."""
+    command = tyro.cli(Command, prog="python -m sweeps", args=args)
+    from jrcjax import parallel  # after parsing, so that --help and errors come at once
+    from jrcjax.types import choice
+
+    parallel.use_all_cores()
+    parallel.keep_compiled()
+    from sweeps.registry import SWEEPS
+    from sweeps.run import run_sweep
+
+    console = Console(stderr=True)
+    if isinstance(command, List):
+        for sweep in SWEEPS.values():
+            print(f"{sweep.name:12s} {sweep.description}")
+        return 0
+    try:
+        choice("name", command.name, tuple(SWEEPS))
+        size = size_of(command.seeds, command.episodes, command.preset, command.smoke)
+        folder = run_sweep(SWEEPS[command.name], size, command.out, console, resume=command.resume)
+    except (ValueError, OSError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    print(folder)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,15 @@
+"""Fig. 5(a): learning curves in the source environment."""
+
+from __future__ import annotations
+
+from jrcjax.presets import paper_params
+from sweeps.sweep import Sweep
+
+FIG5A = Sweep(
+    name="fig5a",
+    description="learning curves in the source environment: DDQN, Q-learning, Round Robin",
+    learners=("ddqn", "q_learning", "round_robin"),
+    x_name="environment",
+    x_values=(0.0,),
+    params_at=lambda x, preset: paper_params("source", preset),
+)

@@ -1,0 +1,149 @@
+"""Results on disk: immutable parts (netCDF), one per block of seeds, and a manifest.
+
+A part is written under a temporary name, synced and renamed, so it is whole or absent. Its attributes hold the
+configuration that made it; a folder never mixes configurations.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from jrcjax.exact import LongRun
+from jrcjax.hparams import Config, HParams
+from jrcjax.provenance import provenance
+from jrcjax.training import Log
+from sweeps.sweep import Size, Sweep
+
+MANIFEST = "manifest.json"
+
+
+class ConfigurationMismatch(ValueError):
+    """A folder holds results of another configuration."""
+
+
+def configuration(sweep: Sweep, size: Size) -> dict[str, Any]:
+    """What must agree for two parts to be of one result. The number of seeds is not part of it."""
+    hparams = {name: np.asarray(value).item() for name, value in vars(HParams()).items()}
+    config = {name: value for name, value in asdict(Config(episodes=size.episodes)).items() if name != "episodes"}
+    return json.loads(
+        json.dumps(
+            {
+                "sweep": sweep.name,
+                "preset": size.preset,
+                "episodes": size.episodes,
+                "learners": sweep.learners,
+                "x": {sweep.x_name: sweep.x_values},
+                "hparams": hparams,
+                "config": config,
+            }
+        )
+    )
+
+
+def check_folder(folder: Path, sweep: Sweep, size: Size) -> None:
+    """Refuses a folder with results of another configuration.
+
+    Raises:
+      ConfigurationMismatch: naming each field that differs, with both values.
+    """
+    manifest = folder / MANIFEST
+    if not manifest.exists():
+        return
+    found, wanted = json.loads(manifest.read_text())["configuration"], configuration(sweep, size)
+    differing = [
+        f"{key}: {json.dumps(found.get(key))} there, {json.dumps(wanted.get(key))} wanted"
+        for key in sorted({*found, *wanted})
+        if found.get(key) != wanted.get(key)
+    ]
+    if differing:
+        raise ConfigurationMismatch(
+            f"{folder} holds results of another configuration ({'; '.join(differing)}); "
+            "choose another --out, or remove the folder"
+        )
+
+
+def dataset(sweep: Sweep, size: Size, seeds: range, log: dict[str, Log], optimum: LongRun) -> xr.Dataset:
+    """Results of some seeds with named dimensions: algorithm, point, seed, episode (from 1)."""
+    dims = ("algorithm", "point", "seed", "episode")
+    stacked = {name: np.stack([getattr(log[learner], name) for learner in sweep.learners]) for name in Log._fields}
+    variables: dict[str, Any] = {name: (dims, values) for name, values in stacked.items()}
+    variables |= {f"optimum_{name}": (("point",), np.asarray(getattr(optimum, name))) for name in LongRun._fields}
+    coords = {
+        "algorithm": list(sweep.learners),
+        "point": np.arange(len(sweep.x_values)),
+        sweep.x_name: ("point", np.asarray(sweep.x_values, float)),
+        "seed": np.array(seeds),
+        "episode": np.arange(1, size.episodes + 1),
+    }
+    return xr.Dataset(variables, coords, {"configuration": json.dumps(configuration(sweep, size), sort_keys=True)})
+
+
+def part_path(folder: Path, seeds: range) -> Path:
+    """File of a block of seeds."""
+    return folder / f"seeds-{seeds.start:06d}-{seeds.stop - 1:06d}.nc"
+
+
+def write_part(folder: Path, seeds: range, data: xr.Dataset) -> Path:
+    """Writes one part, whole or not at all."""
+    path = part_path(folder, seeds)
+    encoding = {name: {"zlib": True, "complevel": 4} for name in data.data_vars if data[name].ndim > 1}
+    _whole(path, lambda temporary: data.to_netcdf(temporary, engine="h5netcdf", encoding=encoding))
+    return path
+
+
+def write_manifest(folder: Path, sweep: Sweep, size: Size) -> None:
+    """Writes what the folder holds and how it came about."""
+    manifest = {
+        "configuration": configuration(sweep, size),
+        "seeds": sorted(finished_seeds(folder)),
+        "parts": sorted(path.name for path in folder.glob("seeds-*.nc")),
+        **provenance(),
+    }
+    text = json.dumps(manifest, indent=2) + "\n"
+    _whole(folder / MANIFEST, lambda temporary: Path(temporary).write_text(text))
+
+
+def _whole(path: Path, write) -> None:
+    """Writes a file under a temporary name, syncs it, and gives it its name."""
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".", suffix=path.suffix)
+    os.close(handle)
+    try:
+        write(temporary)
+        with open(temporary, "rb") as written:
+            os.fsync(written.fileno())
+        Path(temporary).chmod(0o644)
+        Path(temporary).replace(path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def finished_seeds(folder: Path) -> set[int]:
+    """Seeds whose parts are there."""
+    found: set[int] = set()
+    for path in folder.glob("seeds-*.nc"):
+        first, last = path.stem.removeprefix("seeds-").split("-")
+        found |= set(range(int(first), int(last) + 1))
+    return found
+
+
+def load(folder: Path, seeds: int) -> xr.Dataset:
+    """The results of seeds 0 to `seeds` - 1 from all parts, in memory.
+
+    Raises:
+      FileNotFoundError: if some of these seeds have not been run.
+    """
+    missing = set(range(seeds)) - finished_seeds(folder)
+    if missing:
+        raise FileNotFoundError(f"{folder}: no results for seeds {sorted(missing)[:5]}...; run the sweep first")
+    parts = [xr.load_dataset(path, engine="h5netcdf") for path in sorted(folder.glob("seeds-*.nc"))]
+    whole = xr.concat(parts, "seed", data_vars="minimal", coords="minimal", compat="override", join="override")
+    return whole.sortby("seed").sel(seed=slice(0, seeds - 1))
