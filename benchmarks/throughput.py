@@ -81,7 +81,7 @@ def _environment(agents: int, steps: int, repetitions: int) -> Result:
         _, state = env.reset(key, params)
         return jax.lax.scan(step, (state, jnp.float32(0.0)), jnp.arange(steps))[0][1]
 
-    run = parallel.over_agents(one)
+    run = parallel.over_agents(one, block=512)
     keys = lambda i: jax.random.split(jax.random.key(i), agents)  # noqa: E731
     return _measure("env", agents, steps, repetitions, lambda: run.lower(params, keys(0)), lambda i: (params, keys(i)))
 

@@ -9,11 +9,11 @@ from jrcjax.environment import EnvState, JRCEnv
 from jrcjax.hparams import Config, HParams
 from jrcjax.params import EnvParams, check_params
 from jrcjax.presets import paper_params
-from jrcjax.training import AgentState, Log, train
+from jrcjax.training import AgentState, Log, train, train_agents
 
 __version__ = "0.1.0"
 
 __all__ = [
     "AgentState", "Config", "EnvParams", "EnvState", "HParams", "JRCEnv", "Log", "check_params", "events", "exact",
-    "paper_params", "radar", "train",
+    "paper_params", "radar", "train", "train_agents",
 ]  # fmt: skip

@@ -17,6 +17,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax.sharding import AxisType, Mesh, PartitionSpec
 
+from jrcjax.checks import refuse
+
 BLOCK = 8
 """Agents that one device advances at once."""
 
@@ -31,7 +33,7 @@ def keep_compiled() -> None:
 
     The folder is `jrcjax` in XDG_CACHE_HOME, or in ~/.cache; JAX_COMPILATION_CACHE_DIR overrules it.
     """
-    if jax.config.read("jax_compilation_cache_dir") is None:
+    if jax.config.jax_compilation_cache_dir is None:  # pyright: ignore[reportAttributeAccessIssue]
         base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
         jax.config.update("jax_compilation_cache_dir", str(Path(base) / "jrcjax"))
 
@@ -41,9 +43,9 @@ def mesh() -> Mesh:
     return Mesh(np.array(jax.devices()), ("agents",), axis_types=(AxisType.Auto,))
 
 
-def padded(count: int) -> int:
+def padded(count: int, block: int = BLOCK) -> int:
     """The number of agents that `over_agents` works with for `count` of them: a multiple of block times devices."""
-    unit = BLOCK * jax.device_count()
+    unit = block * jax.device_count()
     return -(-count // unit) * unit
 
 
@@ -56,26 +58,34 @@ def pad_agents(tree: Any, count: int) -> Any:
     return jax.tree.map(pad, tree)
 
 
-def over_agents(function: Callable, **jit_options) -> Callable:
+def over_agents(function: Callable, block: int = BLOCK) -> Callable:
     """`function(shared, agents)` of one agent as a compiled function of many.
 
     Args:
       function: pure; `shared` is the same for all agents, `agents` a pytree of one agent's values.
-      jit_options: passed to `jax.jit`.
+      block: agents that one device advances at once; more of them for functions that do little per agent.
 
     Returns:
       A function of the same arguments, every leaf of `agents` and of the result with a leading axis of agents, whose
-      length must be a multiple of BLOCK times the number of devices (see `padded`).
+      length must be a multiple of `block` times the number of devices (see `padded`); otherwise it raises ValueError.
     """
     along, everywhere = PartitionSpec("agents"), PartitionSpec()
 
     def on_one_device(shared, agents):
-        blocks = jax.tree.map(lambda a: a.reshape(-1, BLOCK, *a.shape[1:]), agents)
+        blocks = jax.tree.map(lambda a: a.reshape(-1, block, *a.shape[1:]), agents)
         # A single block needs no loop, which would copy the agents' memory in and out.
         if jax.tree.leaves(blocks)[0].shape[0] == 1:
             return jax.vmap(function, in_axes=(None, 0))(shared, agents)
-        done = jax.lax.map(lambda block: jax.vmap(function, in_axes=(None, 0))(shared, block), blocks)
+        done = jax.lax.map(lambda agents: jax.vmap(function, in_axes=(None, 0))(shared, agents), blocks)
         return jax.tree.map(lambda a: a.reshape(-1, *a.shape[2:]), done)
 
+    devices = jax.device_count()
     sharded = jax.shard_map(on_one_device, mesh=mesh(), in_specs=(everywhere, along), out_specs=along, check_vma=False)
-    return jax.jit(sharded, **jit_options)
+
+    def checked(shared, agents):
+        count = jax.tree.leaves(agents)[0].shape[0]
+        if count % (block * devices):
+            refuse("agents", count, f"a multiple of {block} agents x {devices} devices")
+        return sharded(shared, agents)
+
+    return jax.jit(checked)

@@ -12,9 +12,11 @@ import jax
 import jax.numpy as jnp
 
 from jrcjax import exploration, metrics, slot
+from jrcjax.checks import refuse
 from jrcjax.exact import evaluate_policy
 from jrcjax.hparams import Config, HParams, check_config, check_hparams
 from jrcjax.learners import Learner, LearnerFactory, Spec, make_learner
+from jrcjax.parallel import over_agents, pad_agents, padded
 from jrcjax.params import EnvParams, check_params
 from jrcjax.replay import Transition
 from jrcjax.types import Float, Int, Key, Words
@@ -52,9 +54,8 @@ def learner_for(learner: str | LearnerFactory, env_params: EnvParams, config: Co
     return make_learner(learner, Spec(env_params.shape, env_params.num_actions), config)
 
 
-def init_agent(key: Key, env_params: EnvParams, hparams: HParams, learner: Learner) -> AgentState:
+def init_agent(key: Key, hparams: HParams, learner: Learner) -> AgentState:
     """An agent before its first episode."""
-    del env_params
     return AgentState(key, learner.init(jax.random.fold_in(key, _INIT), hparams))
 
 
@@ -142,11 +143,54 @@ def train(
     Raises:
       ValueError: naming the field, the value and what is allowed, before anything compiles.
     """
+    hparams, config = _checked(env_params, hparams, config)
+    rule = learner_for(learner, env_params, config)
+    agent = init_agent(key, hparams, rule)
+    return run_episodes(agent, 0, config.episodes, env_params, hparams, rule)
+
+
+def train_agents(
+    keys: Key,
+    env_params: EnvParams,
+    hparams: HParams | None = None,
+    *,
+    learner: str | LearnerFactory,
+    config: Config | None = None,
+) -> tuple[AgentState, Log]:
+    """`train` for many keys in one environment, in blocks on all cores (see `jrcjax.parallel`).
+
+    Args:
+      keys: [N] PRNG keys.
+      env_params: the environment, shared by all agents.
+      hparams: hyperparameters, shared by all agents; Table I's if None.
+      learner: as for `train`.
+      config: static settings; Table I's if None.
+
+    Returns:
+      The agents and their logs, each leaf with a leading axis of N.
+
+    Raises:
+      ValueError: naming the field, the value and what is allowed, before anything compiles.
+    """
+    hparams, config = _checked(env_params, hparams, config)
+    if keys.ndim != 1 or keys.shape[0] < 1:
+        refuse("keys", f"shape {keys.shape}", "an array of at least one key, as jax.random.split returns it")
+    rule = learner_for(learner, env_params, config)
+
+    def one(shared, key):
+        env_params, hparams = shared
+        return run_episodes(init_agent(key, hparams, rule), 0, config.episodes, env_params, hparams, rule)
+
+    lanes = pad_agents(keys, padded(keys.shape[0]))
+    done = over_agents(one)((env_params, hparams), lanes)
+    return jax.tree.map(lambda leaf: leaf[: keys.shape[0]], done)
+
+
+def _checked(env_params: EnvParams, hparams: HParams | None, config: Config | None) -> tuple[HParams, Config]:
+    """Fills in the defaults and checks everything."""
     hparams = HParams() if hparams is None else hparams
     config = Config() if config is None else config
     check_params(env_params)
     check_hparams(hparams)
     check_config(config)
-    rule = learner_for(learner, env_params, config)
-    agent = init_agent(key, env_params, hparams, rule)
-    return run_episodes(agent, 0, config.episodes, env_params, hparams, rule)
+    return hparams, config

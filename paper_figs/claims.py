@@ -1,9 +1,9 @@
 """The paper's claims, judged: each a pure function of results that gives an effect with a 95 % interval and a verdict.
 
-A claim is a statement "effect <= limit". With the whole interval on the claim's side of the limit it is supported, with
-the whole interval on the other side contradicted, and otherwise undecided at this number of seeds. The interval is a
-percentile bootstrap over seeds with a fixed generator. A gap is measured on the exact long-run reward of the policy
-without exploration: (optimum - reward) / |optimum|.
+A claim is a statement "effect <= limit" or "effect >= limit". With the whole interval on the claim's side of the limit
+it is supported, with the whole interval on the other side contradicted, and otherwise undecided at this number of
+seeds. The interval is a percentile bootstrap over seeds with a fixed generator. A gap is measured on the exact long-run
+reward of the policy without exploration: (optimum - reward) / |optimum|.
 """
 
 from __future__ import annotations
@@ -26,11 +26,13 @@ class Judgement:
     """Number in the list of claims, with the part that is judged."""
     statement: str
     effect: str
-    """What is measured, and the limit that it is held against."""
+    """What is measured."""
+    relation: str
+    """<= or >=: how the claim holds the effect against the limit."""
+    limit: float
     value: float
     ci_low: float
     ci_high: float
-    limit: float
     verdict: str
     """supported, contradicted, or undecided."""
     n_seeds: int
@@ -48,8 +50,10 @@ def bootstrap_mean(values: np.ndarray, seed: int = 0) -> tuple[float, float, flo
     return float(values.mean()), float(low), float(high)
 
 
-def verdict_of(low: float, high: float, limit: float) -> str:
-    """Verdict on "effect <= limit" from an effect's interval."""
+def verdict_of(low: float, high: float, relation: str, limit: float) -> str:
+    """Verdict on "effect <= limit" or "effect >= limit" from the effect's interval."""
+    if relation == ">=":
+        low, high, limit = -high, -low, -limit
     if high <= limit:
         return "supported"
     if low > limit:
@@ -57,11 +61,13 @@ def verdict_of(low: float, high: float, limit: float) -> str:
     return "undecided"
 
 
-def judge(claim: str, statement: str, effect: str, values: np.ndarray, limit: float, figure: str) -> Judgement:
-    """Judges "mean over seeds of `values` [seeds] <= limit"."""
+def judge(
+    claim: str, statement: str, effect: str, values: np.ndarray, relation: str, limit: float, figure: str
+) -> Judgement:
+    """Judges "mean over seeds of `values` [seeds] <= limit", or >=."""
     mean, low, high = bootstrap_mean(values)
-    verdict = verdict_of(low, high, limit)
-    return Judgement(claim, statement, effect, mean, low, high, limit, verdict, len(values), figure)
+    verdict = verdict_of(low, high, relation, limit)
+    return Judgement(claim, statement, effect, relation, limit, mean, low, high, verdict, len(values), figure)
 
 
 def gaps(data: xr.Dataset, algorithm: str) -> np.ndarray:
@@ -85,37 +91,40 @@ def source_claims(data: xr.Dataset) -> list[Judgement]:
         return []
     ddqn, q_learning = gaps(data, "ddqn"), gaps(data, "q_learning")
     below = mean_reward(data, "round_robin") - np.minimum(mean_reward(data, "ddqn"), mean_reward(data, "q_learning"))
-    percent = f"{TOLERANCE:.0%}"
     return [
         judge(
             "C1 (reached)",
             "DDQN reaches the optimal policy after about 200 episodes",
-            f"mean gap, episodes 201 to 400 (at most {percent})",
+            "mean gap in episodes 201 to 400",
             ddqn[:, 200:400].mean(axis=1),
+            "<=",
             TOLERANCE,
             "5a",
         ),
         judge(
             "C1 (stable)",
             "DDQN is stable at the optimal policy after 400 episodes",
-            f"mean gap after episode 400 (at most {percent})",
+            "mean gap after episode 400",
             ddqn[:, 400:].mean(axis=1),
+            "<=",
             TOLERANCE,
             "5a",
         ),
         judge(
             "C2 (Q-learning)",
             "Q-learning does not reach the optimal policy in the source",
-            f"minus the mean gap after episode 400 (at most -{percent})",
-            -q_learning[:, 400:].mean(axis=1),
-            -TOLERANCE,
+            "mean gap after episode 400",
+            q_learning[:, 400:].mean(axis=1),
+            ">=",
+            TOLERANCE,
             "5a",
         ),
         judge(
             "C2 (Round Robin)",
             "Round Robin is the lower bound in the source",
-            "reward per slot above the worse learner's (at most 0)",
+            "reward per slot minus that of the worse learner",
             below,
+            "<=",
             0.0,
             "5a",
         ),

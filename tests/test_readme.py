@@ -1,0 +1,30 @@
+"""The README's code runs as written, and its table and paths are what the project holds."""
+
+import json
+import re
+from pathlib import Path
+
+from paper_figs.readme import claims_table
+
+ROOT = Path(__file__).parent.parent
+README = (ROOT / "README.md").read_text()
+
+
+def test_quick_start_runs_as_written(capsys):
+    blocks = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    assert blocks
+    for block in blocks:
+        exec(compile(block, "README.md", "exec"), {})
+    assert "(9, 5) (9, 5)" in capsys.readouterr().out
+
+
+def test_claims_table_is_that_of_the_committed_results():
+    claims = json.loads((ROOT / "paper_figs" / "reference" / "claims.json").read_text())
+    assert claims_table(claims) in README
+
+
+def test_every_path_exists():
+    paths = re.findall(r"`((?:jrcjax|paper_figs|sweeps|benchmarks)/[\w./]+)`", README)
+    paths += re.findall(r"\]\((?!http)([\w./]+)\)", README)
+    assert len(paths) > 10
+    assert [path for path in paths if not (ROOT / path).exists()] == []

@@ -1,0 +1,163 @@
+"""Sweeps end to end at a tiny size: parts on disk, resuming, refusing, and agreement with single runs."""
+
+import json
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import xarray as xr
+from rich.console import Console
+
+import jrcjax
+from jrcjax import exact
+from sweeps import store
+from sweeps.__main__ import main
+from sweeps.program import chunk_of, optimum_of, points_of
+from sweeps.registry import SWEEPS
+from sweeps.run import SEEDS_PER_PART, blocks, run_sweep
+from sweeps.sweep import Size, size_of
+
+FIG5A = SWEEPS["fig5a"]
+SIZE = Size(seeds=3, episodes=2)
+QUIET = Console(quiet=True)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return run_sweep(FIG5A, SIZE, tmp_path_factory.mktemp("results"), QUIET, resume=False)
+
+
+def test_results_have_named_dimensions_and_the_optimum(folder):
+    data = store.load(folder, SIZE.seeds)
+    assert dict(data.sizes) == {"algorithm": 3, "point": 1, "seed": 3, "episode": 2}
+    params = jrcjax.paper_params("source")
+    best = exact.evaluate_policy(params, exact.optimal_policy(params))
+    np.testing.assert_allclose(data["optimum_reward"].values, [best.reward], rtol=1e-6)
+    assert np.isfinite(data["reward"].values).all()
+
+
+@pytest.mark.parametrize("learner", ["ddqn", "q_learning", "round_robin"])
+def test_a_seed_of_a_sweep_is_a_single_run_of_that_key(folder, learner):
+    data = store.load(folder, SIZE.seeds)
+    key = jax.random.fold_in(jax.random.key(0), 2)
+    config = jrcjax.Config(episodes=SIZE.episodes)
+    _, log = jrcjax.train(key, jrcjax.paper_params("source"), learner=learner, config=config)
+    swept = data.sel(algorithm=learner, seed=2).isel(point=0)
+    # Batched and single programs round differently, which 600 slots of training do not amplify beyond this.
+    np.testing.assert_allclose(swept["reward"].values, log.reward, rtol=1e-4)
+    np.testing.assert_allclose(swept["throughput"].values, log.throughput, rtol=1e-4)
+
+
+def test_more_seeds_are_added_and_the_old_part_is_left_alone(folder):
+    part = store.part_path(folder, range(0, 3))
+    before = part.read_bytes()
+    run_sweep(FIG5A, Size(seeds=5, episodes=2), folder.parent, QUIET, resume=True)
+    assert part.read_bytes() == before
+    assert sorted(p.name for p in folder.glob("*.nc")) == ["seeds-000000-000002.nc", "seeds-000003-000004.nc"]
+    assert list(store.load(folder, 5)["seed"].values) == [0, 1, 2, 3, 4]
+    manifest = json.loads((folder / store.MANIFEST).read_text())
+    assert manifest["seeds"] == [0, 1, 2, 3, 4]
+    assert {"configuration", "parts", "command", "versions", "machine", "git_commit"} <= manifest.keys()
+
+
+def test_results_of_another_configuration_are_refused_with_the_difference(folder):
+    with pytest.raises(store.ConfigurationMismatch, match=r"episodes: 2 there, 4 wanted"):
+        run_sweep(FIG5A, Size(seeds=3, episodes=4), folder.parent, QUIET, resume=True)
+
+
+def test_existing_results_are_not_touched_without_resume(folder):
+    with pytest.raises(ValueError, match="--resume"):
+        run_sweep(FIG5A, SIZE, folder.parent, QUIET, resume=False)
+
+
+def test_an_interrupted_write_leaves_no_part(tmp_path, monkeypatch):
+    def broken(self, path, **options):
+        with open(path, "wb") as file:
+            file.write(b"half")
+        raise OSError("disk full")
+
+    monkeypatch.setattr(xr.Dataset, "to_netcdf", broken)
+    with pytest.raises(OSError, match="disk full"):
+        store.write_part(tmp_path, range(2), xr.Dataset())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_missing_seeds_are_named(folder):
+    with pytest.raises(FileNotFoundError, match="seeds"):
+        store.load(folder, 50)
+
+
+def test_blocks_cover_what_is_missing_once_and_keep_to_the_grid():
+    finished = {0, 1, 2, 17, 18}
+    todo = list(blocks(40, finished))
+    assert sorted(seed for block in todo for seed in block) == sorted(set(range(40)) - finished)
+    assert all(block.start // SEEDS_PER_PART == (block.stop - 1) // SEEDS_PER_PART for block in todo)
+
+
+@pytest.mark.parametrize(("episodes", "chunk"), [(1000, 50), (20, 20), (7, 7), (53, 1), (96, 48)])
+def test_chunks_divide_the_episodes(episodes, chunk):
+    assert chunk_of(episodes) == chunk
+
+
+def test_the_program_is_compiled_once_for_all_blocks(tmp_path):
+    compiled = []
+
+    def listen(event, duration, **about):
+        if event == "/jax/core/compile/backend_compile_duration":
+            compiled.append(about.get("fun_name"))
+
+    jax.monitoring.register_event_duration_secs_listener(listen)
+    try:
+        # Three blocks, with a number of episodes that no other test uses, so that nothing is compiled yet.
+        run_sweep(FIG5A, Size(seeds=2 * SEEDS_PER_PART + 1, episodes=3), tmp_path, QUIET, resume=False)
+    finally:
+        jax.monitoring.unregister_event_duration_listener(listen)
+    assert compiled.count("jit(checked)") == 2  # one program starts the agents, one advances them
+
+
+def test_the_optimum_of_stacked_points_is_that_of_each_alone():
+    points = points_of(FIG5A, "paper_table")
+    assert points.radar.density.shape == (1,)
+    params = jrcjax.paper_params("source", "paper_table")
+    best = exact.evaluate_policy(params, exact.optimal_policy(params))
+    np.testing.assert_allclose(optimum_of(points).reward[0], best.reward, rtol=1e-6)
+
+
+@pytest.mark.parametrize("field", ["seeds", "episodes"])
+@pytest.mark.parametrize("value", [0, -1, 1.5, True, "3", None])
+def test_bad_sizes_are_refused(field, value, tmp_path):
+    with pytest.raises(ValueError, match=f"^{field}: "):
+        run_sweep(FIG5A, Size(**{field: value}), tmp_path, QUIET, resume=False)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["run", "fig99"], "name: 'fig99' is unknown; allowed: 'fig5a'"),
+        (["run", "fig5a", "--seeds", "0"], "seeds: 0; allowed: an integer >= 1"),
+        (["run", "fig5a", "--preset", "table"], "preset: 'table' is unknown; allowed: 'paper', 'paper_table'"),
+    ],
+)
+def test_command_line_errors_name_field_value_and_allowed(arguments, message, capsys, tmp_path):
+    assert main([*arguments, "--out", str(tmp_path)]) == 2
+    assert message in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_list_names_every_sweep(capsys):
+    assert main(["list"]) == 0
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == list(SWEEPS)
+
+
+def test_options_overrule_the_smoke_size():
+    assert size_of(None, None, "paper", smoke=True) == Size(2, 20, "paper")
+    assert size_of(7, None, "paper_table", smoke=True) == Size(7, 20, "paper_table")
+    assert size_of(None, 5, "paper", smoke=False) == Size(10, 5, "paper")
+
+
+def test_keys_of_seeds_do_not_depend_on_how_many_there_are():
+    few = [jax.random.fold_in(jax.random.key(0), i) for i in range(3)]
+    many = jax.vmap(lambda i: jax.random.fold_in(jax.random.key(0), i))(jnp.arange(100))
+    assert all((jax.random.key_data(a) == jax.random.key_data(b)).all() for a, b in zip(few, many[:3], strict=True))
