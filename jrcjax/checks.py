@@ -36,6 +36,8 @@ def require(field: str, value: Any, shape: tuple[int | None, ...], test: Callabl
       test: array to booleans.
       allowed: what the error says is allowed.
     """
+    if shape and not hasattr(value, "shape"):
+        refuse(field, str(value), f"an array, {allowed}")
     got = np.shape(value)
     if len(got) != len(shape) or any(g == 0 or w not in (None, g) for g, w in zip(got, shape, strict=True)):
         wanted = tuple("any" if w is None else w for w in shape)

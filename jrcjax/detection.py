@@ -146,8 +146,7 @@ def is_merged(box: Boxes, resolution: Float) -> Bool:
 def cluster_label(box: Boxes, resolution: Float) -> Int:
     """Smallest index in each object's cluster of transitively unresolved objects; same shapes as `is_merged`.
 
-    Labels spread to neighbours, then jump to the label of their label, so the number of rounds grows with the
-    logarithm of a cluster's extent.
+    Labels spread to neighbours, then jump to the label of their label, until a round changes nothing.
     """
     n = box.x.shape[-1]
 

@@ -76,11 +76,8 @@ def _is_data(params: EnvParams) -> jax.Array:
 def expected_reward(params: EnvParams) -> Float:
     """E[rho | s, a], [S, A]; equation (11) averaged over event and placement, in both of which it is linear."""
     p = event_probability(params)[:, None]
-    packets = packet_table(params)
-    given = [
-        reward(_is_data(params), jnp.bool_(event), packets, miss_table(params), params.reward_weights)
-        for event in (True, False)
-    ]
+    is_data, packets, miss = _is_data(params)[None], packet_table(params), miss_table(params)[None]
+    given = [reward(is_data, jnp.bool_(e), packets, miss, params.reward_weights) for e in (True, False)]
     return p * given[0] + (1.0 - p) * given[1]
 
 
@@ -150,12 +147,12 @@ def evaluate_policy(params: EnvParams, policy: Float) -> LongRun:
     """
     visits = stationary_distribution(params)[:, None] * policy
     p = event_probability(params)[:, None]
-    packets, miss, is_data = packet_table(params), miss_table(params), _is_data(params)
+    packets, miss, is_data = packet_table(params), miss_table(params)[None], _is_data(params)[None]
     throughput, missed, counted = jnp.float32(0.0), jnp.float32(0.0), jnp.float32(0.0)
     for event, chance in ((jnp.bool_(True), p), (jnp.bool_(False), 1.0 - p)):
         weight = visits * chance
         throughput += (weight * metrics.counted_packets(packets, event, params.count_event_packets)).sum()
-        counts = weight * metrics.counts_for_miss(is_data, event, params.miss_convention)
+        counts = jnp.where(metrics.counts_for_miss(is_data, event, params.miss_convention), weight, 0.0)
         missed, counted = missed + (counts * miss).sum(), counted + counts.sum()
     sums = metrics.zero()._replace(missed=missed, counted=counted)
     return LongRun((visits * expected_reward(params)).sum(), throughput, metrics.miss_detection(sums))

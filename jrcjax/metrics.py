@@ -57,4 +57,5 @@ def throughput(sums: Metrics) -> Float:
 
 def miss_detection(sums: Metrics) -> Float:
     """P_k, equation (7); NaN if no slot counts (an episode without events or without radar)."""
-    return jnp.where(sums.counted > 0, sums.missed / jnp.maximum(sums.counted, 1.0), jnp.nan)
+    some = sums.counted > 0  # a number of slots, or in the exact solver a probability below 1
+    return jnp.where(some, sums.missed / jnp.where(some, sums.counted, 1.0), jnp.nan)

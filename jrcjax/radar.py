@@ -74,13 +74,21 @@ def _replace(self: Radar, **changes) -> Radar:
     """A copy with the given fields changed and a bank that fits them.
 
     Inside `jit` or `vmap`, where a density has no value, `max_objects` stays as it is.
+
+    Raises:
+      ValueError: naming the field, the value and what is allowed.
     """
-    new = dataclasses.replace(self, **changes)
     if changes.keys() <= {"miss_bank", "max_objects", "placements"}:
-        return new
-    if "max_objects" not in changes:
-        new = dataclasses.replace(new, max_objects=_capacities(new))
-    return dataclasses.replace(new, miss_bank=build_bank(new, self.miss_bank.shape[-1]))
+        return dataclasses.replace(self, **changes)
+    bank_size = self.miss_bank.shape[-1]
+    modes = np.shape(changes.get("bandwidth", self.bandwidth))
+    new = dataclasses.replace(self, miss_bank=jnp.zeros((*modes, bank_size)), max_objects=(), **changes)
+    check_radar(new)
+    given = {
+        name: jnp.asarray(value, getattr(self, name).dtype) for name, value in changes.items() if name != "placements"
+    }
+    new = dataclasses.replace(new, **given, max_objects=_capacities(new, self.max_objects))
+    return dataclasses.replace(new, miss_bank=build_bank(new, bank_size))
 
 
 # After the class, because flax's decorator sets a `replace` of its own.
@@ -133,7 +141,8 @@ def make_radar(
         placements=placements,
     )
     check_radar(radar)
-    radar = dataclasses.replace(radar, max_objects=_capacities(radar, max_density))
+    scale = 1.0 if max_density is None else max(max_density / density, 1.0)
+    radar = dataclasses.replace(radar, max_objects=_capacities(radar, scale=scale))
     return dataclasses.replace(radar, miss_bank=build_bank(radar, bank_size))
 
 
@@ -143,15 +152,16 @@ def mean_count(radar: Radar) -> Float:
     return radar.density * (reach / REFERENCE_SIDE) ** 2
 
 
-def _capacities(radar: Radar, density: float | None = None) -> tuple[int, ...]:
-    """Slots that hold any fixed count, and a Poisson count but for a chance below 1e-12."""
+def _capacities(radar: Radar, at_least: tuple[int, ...] = (), scale: float = 1.0) -> tuple[int, ...]:
+    """Slots for any fixed count, and for a Poisson count but for a chance below 1e-12, at `scale` times the density."""
     if is_traced(radar.density, radar.slope, radar.max_intermediate_frequency):
-        return radar.max_objects
+        return at_least
     with jax.ensure_compile_time_eval():
-        scale = 1.0 if density is None else max(density / float(radar.density), 1.0)
         mean = np.asarray(mean_count(radar), np.float64) * scale
     needed = [math.ceil(m + 8.0 * math.sqrt(m) + 8.0) for m in mean]
-    return tuple(max(pair) for pair in zip(needed, radar.max_objects or needed, strict=True))
+    if len(at_least) != len(needed):
+        return tuple(needed)
+    return tuple(max(pair) for pair in zip(needed, at_least, strict=True))
 
 
 def fresh_miss_ratio(key: Key, mode: int, radar: Radar) -> Float:
@@ -213,7 +223,7 @@ def miss_ratio(
     if not is_traced(radar.density):
         if not (np.isfinite(radar.density) and radar.density > 0):
             raise ValueError(f"density: {density!r}; allowed: a finite number > 0")
-        radar = dataclasses.replace(radar, max_objects=_capacities(radar))
+        radar = dataclasses.replace(radar, max_objects=_capacities(radar, radar.max_objects))
     if isinstance(mode, jax.Array):
         return _fresh_of(key, mode, radar)
     if not 0 <= mode < radar.num_modes:

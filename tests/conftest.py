@@ -1,0 +1,86 @@
+"""Settings that all tests share, and the environments that they look at.
+
+Two CPU devices, so that what is sharded over devices is sharded in the tests, too.
+"""
+
+import jax
+import jax.numpy as jnp
+import pytest
+import reference
+
+import jrcjax
+from jrcjax.channel import Channel
+from jrcjax.params import EnvParams, make_factor
+from jrcjax.radar import make_radar
+
+jax.config.update("jax_num_cpu_devices", 2)  # nothing above makes an array
+
+PAPER = [(environment, preset) for preset in ("paper", "paper_table") for environment in ("source", "target")]
+RANDOM_SEEDS = (0, 1, 2)
+
+
+def random_params(seed: int) -> EnvParams:
+    """A valid environment with 2 or 3 levels per factor, 3 rates and 3 radar modes; persistence from seed 1 on."""
+    described = reference.random_description(seed)
+    as_float = lambda value: jnp.asarray(value, jnp.float32)  # noqa: E731
+    channel = described["channel"]
+    factors = {name: make_factor(**described[name]) for name in ("road", "weather", "speed", "nearby")}
+    return EnvParams(
+        channel=Channel(**{name: as_float(value) for name, value in channel.items()}),
+        **factors,
+        radar=make_radar(
+            bandwidth=(3e8, 5e8, 7.5e8),
+            slope=(1e13, 1.2e13, 1.5e13),
+            max_intermediate_frequency=(4e6, 3e6, 2e6),
+            density=12.0,
+            class_share=(0.5, 0.3, 0.2),
+            size_mean=((4.6, 1.9), (0.7, 0.7), (9.0, 2.5)),
+            size_std=((0.2, 0.1), (0.1, 0.1), (1.0, 0.2)),
+            bank_size=512,
+        ),
+        reward_weights=as_float(described["reward_weights"]),
+        event_model=jnp.int32(described["event_model"]),
+        miss_convention=jnp.int32(0),
+        count_event_packets=jnp.int32(1),
+        terminal_time_limit=jnp.int32(0),
+    )
+
+
+class Environments(dict):
+    """Environments by name, made when first asked for."""
+
+    def __missing__(self, name: str) -> EnvParams:
+        first, second = name.split("-")
+        self[name] = random_params(int(second)) if first == "random" else jrcjax.paper_params(second, first)
+        return self[name]
+
+
+@pytest.fixture(scope="session")
+def environments() -> Environments:
+    """The paper's four environments and the random ones: "paper-source", "paper_table-target", "random-0"."""
+    return Environments()
+
+
+@pytest.fixture(params=[f"{preset}-{name}" for name, preset in PAPER] + [f"random-{seed}" for seed in RANDOM_SEEDS])
+def any_params(request, environments) -> EnvParams:
+    """Each of the environments in turn."""
+    return environments[request.param]
+
+
+@pytest.fixture
+def target(environments) -> EnvParams:
+    """The paper's target environment."""
+    return environments["paper-target"]
+
+
+@pytest.fixture
+def source(environments) -> EnvParams:
+    """The paper's source environment."""
+    return environments["paper-source"]
+
+
+@pytest.fixture
+def strict():
+    """Refuses implicit changes of rank and type."""
+    with jax.numpy_rank_promotion("raise"), jax.numpy_dtype_promotion("strict"):
+        yield

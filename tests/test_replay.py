@@ -1,0 +1,113 @@
+from collections import Counter, deque
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import stats
+
+from jrcjax import replay
+from jrcjax.replay import Transition
+
+STATES, ACTIONS = 32, 4
+WHERE = replay.layout(STATES, ACTIONS)
+ADD = jax.jit(replay.add, static_argnums=3)
+SAMPLE = jax.jit(replay.sample, static_argnums=3)
+
+TRANSITIONS = st.tuples(
+    st.integers(0, STATES - 1),
+    st.integers(0, ACTIONS - 1),
+    st.floats(-100, 100, width=32),
+    st.integers(0, STATES - 1),
+    st.integers(0, 1),
+)
+
+
+def as_tuples(batch: Transition) -> list[tuple]:
+    return list(zip(*(np.asarray(field).tolist() for field in batch), strict=True))
+
+
+def numbered(i: int) -> tuple:
+    """A transition that tells its number by its reward, which is never 0 as in a slot that was not written."""
+    return i % STATES, i % ACTIONS, float(i + 1), (i + 1) % STATES, i % 2
+
+
+def filled_ring(capacity: int, count: int) -> jax.Array:
+    ring = replay.init(capacity, WHERE)
+    for i in range(count):
+        ring = ADD(ring, Transition(*numbered(i)), i, WHERE)
+    return ring
+
+
+def first_word_of_each_index(n: int) -> jax.Array:
+    return jnp.asarray([-(-i * 2**32 // n) for i in range(n)], jnp.uint32)
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(capacity=st.integers(1, 6), transitions=st.lists(TRANSITIONS, min_size=1, max_size=20))
+def test_ring_against_a_list_of_the_latest(capacity, transitions):
+    ring, twin = replay.init(capacity, WHERE), deque(maxlen=capacity)
+    for count, transition in enumerate(transitions):
+        ring = ADD(ring, Transition(*transition), count, WHERE)
+        twin.append(transition)
+        # These words pick each filled slot once, so the sample is all that the ring holds.
+        held = SAMPLE(ring, first_word_of_each_index(len(twin)), count + 1, WHERE)
+        assert Counter(as_tuples(held)) == Counter(twin)
+
+
+@pytest.mark.parametrize(
+    ("states", "actions", "words"),
+    [(1, 1, 1), (32, 4, 1), (2**14, 4, 1), (2**15, 4, 2), (2**16, 2**15, 2), (2**31 - 1, 4, 3)],
+)
+def test_layout_takes_as_few_words_as_the_ids_fit(states, actions, words):
+    where = replay.layout(states, actions)
+    assert where.words == words
+    assert replay.init(3, where).shape == (3, words + 1)
+    taken = [set() for _ in range(words)]
+    for word, shift, bits in where.fields:
+        field = set(range(shift, shift + bits))
+        assert max(field) < 32
+        assert not taken[word] & field  # no two fields share a bit
+        taken[word] |= field
+
+
+@settings(max_examples=150, deadline=None, derandomize=True)
+@given(st.data(), st.sampled_from([1, 2, 3, 32, 1000, 2**15, 10**6, 2**31 - 1]), st.integers(1, 70_000))
+def test_pack_and_unpack_are_inverse(data, states, actions):
+    where = replay.layout(states, actions)
+    ids = st.one_of(st.integers(0, states - 1), st.just(states - 1))  # the largest id has all bits in use
+    transition = (
+        data.draw(ids),
+        data.draw(st.one_of(st.integers(0, actions - 1), st.just(actions - 1))),
+        data.draw(st.floats(width=32, allow_nan=False)),
+        data.draw(ids),
+        data.draw(st.integers(0, 1)),
+    )
+    row = replay.pack(Transition(*transition), where)
+    assert row.shape == (where.words + 1,)
+    assert as_tuples(replay.unpack(row[None], where)) == [transition]
+
+
+@pytest.mark.parametrize(("capacity", "count"), [(64, 40), (64, 64), (64, 150)])
+def test_samples_are_uniform_over_what_is_held(capacity, count):
+    words = jax.random.bits(jax.random.key(count), (40_000,), jnp.uint32)
+    rewards = np.asarray(SAMPLE(filled_ring(capacity, count), words, count, WHERE).reward).astype(int)
+    held = np.arange(max(count - capacity, 0), count) + 1
+    frequencies = np.array([(rewards == reward).sum() for reward in held])
+    assert frequencies.sum() == len(rewards)
+    assert stats.chisquare(frequencies).pvalue > 1e-3
+
+
+@pytest.mark.parametrize("count", [1, 2, 31, 63])
+def test_slots_not_yet_written_are_never_sampled(count):
+    random = jax.random.bits(jax.random.key(1), (5000,), jnp.uint32)
+    words = jnp.concatenate([jnp.asarray([0, 2**32 - 1], jnp.uint32), random])
+    batch = SAMPLE(filled_ring(64, count), words, count, WHERE)
+    assert set(as_tuples(batch)) <= {numbered(i) for i in range(count)}
+
+
+def test_sampling_is_with_replacement():
+    batch = SAMPLE(filled_ring(4, 4), jnp.zeros(8, jnp.uint32), 4, WHERE)
+    assert as_tuples(batch) == [numbered(0)] * 8
