@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
-from jrcjax.checks import is_ascending, is_distribution, is_not_negative, is_positive, require
+from jrcjax.checks import is_ascending, is_distribution, is_not_negative, is_positive, require, require_type
 from jrcjax.types import Float, Int
 
 
@@ -49,6 +49,7 @@ def check_dynamics(name: str, prior: Float, persistence: Float) -> None:
 
 def check_channel(channel: Channel) -> None:
     """Raises ValueError naming the field, the value and what is allowed."""
+    require_type("channel", channel, Channel)
     check_dynamics("channel", channel.prior, channel.persistence)
     levels, rates = np.shape(channel.prior)[-1], np.shape(channel.packets)[-1] if np.ndim(channel.packets) else None
     require("channel.received_power", channel.received_power, (), is_positive, "a power > 0 W")

@@ -26,7 +26,9 @@ def refuse(field: str, value: Any, allowed: str) -> NoReturn:
     raise ValueError(f"{field}: {shown!r}; allowed: {allowed}")
 
 
-def require(field: str, value: Any, shape: tuple[int | None, ...], test: Callable[[np.ndarray], Any], allowed: str):
+def require(
+    field: str, value: Any, shape: tuple[int | None, ...], test: Callable[[np.ndarray], Any], allowed: str, kinds="iuf"
+) -> None:
     """Refuses a wrong shape, a non-number, NaN, and entries for which `test` fails.
 
     Args:
@@ -35,6 +37,7 @@ def require(field: str, value: Any, shape: tuple[int | None, ...], test: Callabl
       shape: wanted shape; None allows any size of at least 1.
       test: array to booleans.
       allowed: what the error says is allowed.
+      kinds: NumPy's letters of the allowed dtypes: signed, unsigned, float.
     """
     if shape and not hasattr(value, "shape"):
         refuse(field, str(value), f"an array, {allowed}")
@@ -45,10 +48,22 @@ def require(field: str, value: Any, shape: tuple[int | None, ...], test: Callabl
     if is_traced(value):
         return
     array = np.asarray(value)
-    if array.dtype.kind not in "iufb":
-        refuse(field, value, f"numbers, {allowed}")
-    if not np.all(np.isfinite(array)) or not np.all(test(array)):
-        refuse(field, value, allowed)
+    if array.dtype.kind not in kinds or not np.isfinite(array).all() or not np.all(test(array)):
+        refuse(field, value if array.dtype.kind in "biuf" else str(value), allowed)
+
+
+def require_type(field: str, value: Any, wanted: type) -> None:
+    """Refuses an object of another type."""
+    if not isinstance(value, wanted):
+        refuse(field, f"a {type(value).__name__}", f"a {wanted.__name__}")
+
+
+def as_array(field: str, value: Any, allowed: str) -> np.ndarray:
+    """Plain numbers as a float32 array."""
+    try:
+        return np.asarray(value, np.float32)
+    except (TypeError, ValueError):
+        refuse(field, str(value), allowed)
 
 
 def is_probability(x: np.ndarray) -> np.ndarray:
@@ -76,7 +91,7 @@ def is_distribution(x: np.ndarray) -> bool:
     return bool(is_probability(x).all() and abs(x.astype(np.float64).sum() - 1) <= _SUM_TOLERANCE)
 
 
-def require_reading(field: str, value: Any, names: tuple[str, ...]):
-    """Refuses an index that no reading has."""
+def require_reading(field: str, value: Any, names: tuple[str, ...]) -> None:
+    """Refuses what is not the index of a reading."""
     allowed = ", ".join(f"{i} ({name})" for i, name in enumerate(names))
-    require(field, value, (), lambda x: np.isin(x, np.arange(len(names))), allowed)
+    require(field, value, (), lambda x: np.isin(x, np.arange(len(names))), allowed, kinds="iu")

@@ -8,7 +8,7 @@ from flax import struct
 
 from jrcjax import states
 from jrcjax.channel import Channel, check_channel, check_dynamics
-from jrcjax.checks import is_not_negative, is_probability, refuse, require, require_reading
+from jrcjax.checks import is_not_negative, is_probability, refuse, require, require_reading, require_type
 from jrcjax.radar import Radar, check_radar
 from jrcjax.types import EVENT_MODELS, MISS_CONVENTIONS, Float, Int
 
@@ -89,6 +89,7 @@ def make_factor(prior, event_probability, persistence: float = 0.0) -> Factor:
 
 def check_factor(name: str, factor: Factor) -> None:
     """Raises ValueError naming the field, the value and what is allowed."""
+    require_type(name, factor, Factor)
     check_dynamics(name, factor.prior, factor.persistence)
     shape = (np.shape(factor.prior)[-1],)
     require(f"{name}.event_probability", factor.event_probability, shape, is_probability, "one of [0, 1] per level")
@@ -100,8 +101,7 @@ def check_params(params: EnvParams) -> None:
     Raises:
       ValueError: naming the field, the value and what is allowed.
     """
-    if not isinstance(params, EnvParams):
-        raise ValueError(f"params: {type(params).__name__}; allowed: EnvParams, as paper_params returns it")
+    require_type("params", params, EnvParams)
     check_channel(params.channel)
     for name in FACTORS[1:]:
         check_factor(name, getattr(params, name))
@@ -109,8 +109,8 @@ def check_params(params: EnvParams) -> None:
     require("reward_weights", params.reward_weights, (4,), is_not_negative, "four weights >= 0 (rho_1 to rho_4)")
     require_reading("event_model", params.event_model, EVENT_MODELS)
     require_reading("miss_convention", params.miss_convention, MISS_CONVENTIONS)
-    require("count_event_packets", params.count_event_packets, (), lambda x: np.isin(x, (0, 1)), "0 or 1")
-    require("terminal_time_limit", params.terminal_time_limit, (), lambda x: np.isin(x, (0, 1)), "0 or 1")
+    require("count_event_packets", params.count_event_packets, (), lambda x: np.isin(x, (0, 1)), "0 or 1", kinds="iu")
+    require("terminal_time_limit", params.terminal_time_limit, (), lambda x: np.isin(x, (0, 1)), "0 or 1", kinds="iu")
     limit = params.max_steps_in_episode
     if not isinstance(limit, int) or isinstance(limit, bool) or limit < 1:
         refuse("max_steps_in_episode", str(limit), "an integer >= 1")

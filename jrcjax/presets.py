@@ -27,12 +27,16 @@ def _db(value: float) -> float:
     return 10.0 ** (value / 10.0)
 
 
-@lru_cache
 def paper_radar(density: float = 27.0) -> Radar:
     """The two chirps and the cars and pedestrians of Table I, at `density` objects per 45 m x 45 m.
 
     One maximum intermediate frequency can't give both ranges that the text states, so each chirp has its own.
     """
+    return _paper_radar(density)
+
+
+@lru_cache
+def _paper_radar(density: float) -> Radar:
     max_if = [2.0 * r * f / chirp.SPEED_OF_LIGHT for r, f in zip(_RANGES, _SLOPES, strict=True)]
     total = _CARS + _PEDESTRIANS
     with jax.ensure_compile_time_eval():  # the cache must hold numbers, also when a trace asks first
@@ -65,7 +69,6 @@ def paper_channel(good: float) -> Channel:
     )
 
 
-@lru_cache
 def paper_params(environment: str = "target", preset: str = "paper") -> EnvParams:
     """Parameters of the paper's source or target environment.
 
@@ -79,6 +82,11 @@ def paper_params(environment: str = "target", preset: str = "paper") -> EnvParam
     """
     choice("environment", environment, ENVIRONMENTS)
     choice("preset", preset, PRESETS)
+    return _paper_params(environment, preset)
+
+
+@lru_cache
+def _paper_params(environment: str, preset: str) -> EnvParams:
     source = environment == "source"
     tau = 0.3 if source else 0.7
     prior = (tau, 1.0 - tau)

@@ -17,12 +17,24 @@ import numpy as np
 from flax import struct
 
 from jrcjax import chirp, detection, rng
-from jrcjax.checks import is_distribution, is_not_negative, is_positive, is_traced, refuse, require, require_reading
+from jrcjax.checks import (
+    as_array,
+    is_distribution,
+    is_not_negative,
+    is_positive,
+    is_probability,
+    is_traced,
+    refuse,
+    require,
+    require_reading,
+    require_type,
+)
 from jrcjax.placement import ObjectClasses, object_count, place_objects
 from jrcjax.types import COUNT_MODELS, COUNTING_RULES, DISTANCES, PLACEMENTS, Float, Int, Key, Words, choice
 
 REFERENCE_SIDE = 45.0
 """Side in m of the square in which the density omega counts objects."""
+_UNLIMITED = 2**31 - 1  # stands for slots that are still to be counted
 _CHUNK = 256  # placements handled at once while a bank is built: about 10 MB of boxes
 
 
@@ -82,7 +94,8 @@ def _replace(self: Radar, **changes) -> Radar:
         return dataclasses.replace(self, **changes)
     bank_size = self.miss_bank.shape[-1]
     modes = np.shape(changes.get("bandwidth", self.bandwidth))
-    new = dataclasses.replace(self, miss_bank=jnp.zeros((*modes, bank_size)), max_objects=(), **changes)
+    unknown = {"miss_bank": np.zeros((*modes, bank_size)), "max_objects": (_UNLIMITED,) * math.prod(modes)}
+    new = dataclasses.replace(self, **{**unknown, **changes})
     check_radar(new)
     given = {
         name: jnp.asarray(value, getattr(self, name).dtype) for name, value in changes.items() if name != "placements"
@@ -121,27 +134,38 @@ def make_radar(
       ValueError: naming the field, the value and what is allowed.
     """
     choice("radar.placements", placements, PLACEMENTS)
-    if not isinstance(bank_size, int) or bank_size < 1:
-        raise ValueError(f"radar.bank_size: {bank_size!r}; allowed: an integer >= 1")
-    as_float = lambda value: jnp.asarray(value, jnp.float32)  # noqa: E731
+    readings = {
+        "distance": choice("radar.distance", distance, DISTANCES),
+        "counting_rule": choice("radar.counting_rule", counting_rule, COUNTING_RULES),
+        "count_model": choice("radar.count_model", count_model, COUNT_MODELS),
+    }
+    for name, value in (("bank_size", bank_size), ("bank_seed", bank_seed)):
+        least = 1 if name == "bank_size" else 0
+        if type(value) is not int or not least <= value < 2**31:
+            refuse(f"radar.{name}", str(value), f"an integer from {least} to 2^31 - 1")
+    numbers = {
+        "bandwidth": bandwidth,
+        "slope": slope,
+        "max_intermediate_frequency": max_intermediate_frequency,
+        "density": density,
+        "class_share": class_share,
+        "size_mean": size_mean,
+        "size_std": size_std,
+    }
+    arrays = {name: as_array(f"radar.{name}", value, "numbers") for name, value in numbers.items()}
+    modes = arrays["bandwidth"].shape
     radar = Radar(
-        bandwidth=as_float(bandwidth),
-        slope=as_float(slope),
-        max_intermediate_frequency=as_float(max_intermediate_frequency),
-        density=as_float(density),
-        class_share=as_float(class_share),
-        size_mean=as_float(size_mean),
-        size_std=as_float(size_std),
-        distance=jnp.int32(choice("radar.distance", distance, DISTANCES)),
-        counting_rule=jnp.int32(choice("radar.counting_rule", counting_rule, COUNTING_RULES)),
-        count_model=jnp.int32(choice("radar.count_model", count_model, COUNT_MODELS)),
+        **{name: jnp.asarray(array) for name, array in arrays.items()},
+        **{name: jnp.int32(index) for name, index in readings.items()},
         bank_seed=jnp.int32(bank_seed),
-        miss_bank=jnp.zeros((np.shape(bandwidth)[-1] if np.ndim(bandwidth) else 0, bank_size)),
-        max_objects=(),
+        miss_bank=jnp.zeros((*modes, bank_size)),
+        max_objects=(_UNLIMITED,) * math.prod(modes),
         placements=placements,
     )
     check_radar(radar)
-    scale = 1.0 if max_density is None else max(max_density / density, 1.0)
+    largest = as_array("radar.max_density", density if max_density is None else max_density, "a number > 0")
+    require("radar.max_density", largest, (), is_positive, "a number > 0")
+    scale = max(float(largest / arrays["density"]), 1.0)
     radar = dataclasses.replace(radar, max_objects=_capacities(radar, scale=scale))
     return dataclasses.replace(radar, miss_bank=build_bank(radar, bank_size))
 
@@ -152,12 +176,16 @@ def mean_count(radar: Radar) -> Float:
     return radar.density * (reach / REFERENCE_SIDE) ** 2
 
 
+def _concrete_counts(radar: Radar) -> np.ndarray:
+    with jax.ensure_compile_time_eval():  # also where a trace builds a radar from known numbers
+        return np.asarray(mean_count(radar), np.float64)
+
+
 def _capacities(radar: Radar, at_least: tuple[int, ...] = (), scale: float = 1.0) -> tuple[int, ...]:
     """Slots for any fixed count, and for a Poisson count but for a chance below 1e-12, at `scale` times the density."""
     if is_traced(radar.density, radar.slope, radar.max_intermediate_frequency):
         return at_least
-    with jax.ensure_compile_time_eval():
-        mean = np.asarray(mean_count(radar), np.float64) * scale
+    mean = _concrete_counts(radar) * scale
     needed = [math.ceil(m + 8.0 * math.sqrt(m) + 8.0) for m in mean]
     if len(at_least) != len(needed):
         return tuple(needed)
@@ -209,25 +237,23 @@ def miss_ratio(
     Raises:
       ValueError: for an unknown reading, mode or a density that is not positive.
     """
+    readings = {
+        "distance": choice("distance", distance, DISTANCES),
+        "counting_rule": choice("rule", rule, COUNTING_RULES),
+        "count_model": choice("count", count, COUNT_MODELS),
+    }
+    require("density", density, (), is_positive, "a finite number > 0")
     if radar is None:
         from jrcjax.presets import paper_radar
 
         radar = paper_radar()
-    radar = dataclasses.replace(
-        radar,
-        density=jnp.asarray(density, jnp.float32),
-        distance=jnp.int32(choice("distance", distance, DISTANCES)),
-        counting_rule=jnp.int32(choice("rule", rule, COUNTING_RULES)),
-        count_model=jnp.int32(choice("count", count, COUNT_MODELS)),
-    )
-    if not is_traced(radar.density):
-        if not (np.isfinite(radar.density) and radar.density > 0):
-            raise ValueError(f"density: {density!r}; allowed: a finite number > 0")
-        radar = dataclasses.replace(radar, max_objects=_capacities(radar, radar.max_objects))
-    if isinstance(mode, jax.Array):
-        return _fresh_of(key, mode, radar)
-    if not 0 <= mode < radar.num_modes:
-        raise ValueError(f"mode: {mode!r}; allowed: 0 to {radar.num_modes - 1}")
+    modes = radar.num_modes
+    require("mode", mode, (), lambda x: (x >= 0) & (x < modes), f"an integer from 0 to {modes - 1}", kinds="iu")
+    indices = {name: jnp.int32(index) for name, index in readings.items()}
+    radar = dataclasses.replace(radar, density=jnp.asarray(density, jnp.float32), **indices)
+    radar = dataclasses.replace(radar, max_objects=_capacities(radar, radar.max_objects))
+    if is_traced(mode):
+        return _fresh_of(key, jnp.asarray(mode), radar)
     return _jitted_fresh(key, int(mode), radar)
 
 
@@ -267,11 +293,14 @@ def mean_miss_ratio(radar: Radar) -> Float:
 
 def check_radar(radar: Radar) -> None:
     """Raises ValueError naming the field, the value and what is allowed."""
+    require_type("radar", radar, Radar)
     require("radar.bandwidth", radar.bandwidth, (None,), is_positive, "one frequency > 0 Hz per radar mode")
     modes = np.shape(radar.bandwidth)
-    require("radar.slope", radar.slope, modes, is_positive, "one slope > 0 Hz/s per radar mode")
+    of_bandwidth = f"radar.bandwidth has {modes[0]}"
+    require("radar.slope", radar.slope, modes, is_positive, f"one slope > 0 Hz/s per radar mode ({of_bandwidth})")
     field = "radar.max_intermediate_frequency"
-    require(field, radar.max_intermediate_frequency, modes, is_positive, "one frequency > 0 Hz per radar mode")
+    allowed = f"one frequency > 0 Hz per radar mode ({of_bandwidth})"
+    require(field, radar.max_intermediate_frequency, modes, is_positive, allowed)
     require("radar.density", radar.density, (), is_positive, "a number of objects > 0 per 45 m x 45 m")
     share = "probabilities in [0, 1] that sum to 1, one per class of objects"
     require("radar.class_share", radar.class_share, (None,), is_distribution, share)
@@ -281,19 +310,26 @@ def check_radar(radar: Radar) -> None:
     require_reading("radar.distance", radar.distance, DISTANCES)
     require_reading("radar.counting_rule", radar.counting_rule, COUNTING_RULES)
     require_reading("radar.count_model", radar.count_model, COUNT_MODELS)
-    require("radar.bank_seed", radar.bank_seed, (), is_not_negative, "an integer >= 0")
+    require("radar.bank_seed", radar.bank_seed, (), is_not_negative, "an integer >= 0", kinds="iu")
     if radar.placements not in PLACEMENTS:
         refuse("radar.placements", radar.placements, ", ".join(map(repr, PLACEMENTS)))
-    require("radar.miss_bank", radar.miss_bank, (*modes, None), lambda x: True, "the bank that `replace` builds")
+    require(
+        "radar.miss_bank", radar.miss_bank, (*modes, None), is_probability, "ratios in [0, 1], as `replace` draws them"
+    )
     _check_count(radar)
 
 
 def _check_count(radar: Radar) -> None:
+    capacities = radar.max_objects
+    allowed = f"a tuple of {radar.num_modes} integers >= 1"
+    if not isinstance(capacities, tuple) or len(capacities) != radar.num_modes:
+        refuse("radar.max_objects", str(capacities), allowed)
+    if not all(type(capacity) is int and capacity >= 1 for capacity in capacities):
+        refuse("radar.max_objects", str(capacities), allowed)
     if is_traced(radar.density, radar.slope, radar.max_intermediate_frequency):
         return
-    with jax.ensure_compile_time_eval():
-        counts = np.asarray(mean_count(radar))
+    counts = _concrete_counts(radar)
     if not (np.round(counts) >= 1).all():
         refuse("radar.density", float(radar.density), f"at least one object in every mode, not {counts.tolist()}")
-    if radar.max_objects and (len(radar.max_objects) != len(counts) or (counts > radar.max_objects).any()):
-        refuse("radar.max_objects", list(radar.max_objects), f"one per mode, at least {np.ceil(counts).tolist()}")
+    if (counts > capacities).any():
+        refuse("radar.max_objects", list(capacities), f"at least {np.ceil(counts).tolist()} at this density")

@@ -226,8 +226,9 @@ def test_unknown_presets_are_refused(arguments):
 @pytest.mark.parametrize("field", ["distance", "rule", "count"])
 @pytest.mark.parametrize("value", ["x", "", None, 0])
 def test_unknown_readings_are_refused(field, value):
+    key = jax.random.key(0)  # made first, because making it compiles
     with nothing_compiles(), pytest.raises(ValueError, match=f"^{field}: .*allowed"):
-        radar.miss_ratio(jax.random.key(0), 27.0, 0, **{field: value})
+        radar.miss_ratio(key, 27.0, 0, **{field: value})
 
 
 @pytest.mark.parametrize(("field", "density", "mode"), [
