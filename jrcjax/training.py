@@ -1,7 +1,8 @@
 """Training one agent: nested scans over episodes and slots, written for one agent and vmapped over many.
 
 `train` is a pure function. `init_agent` and `run_episodes` are its two halves, for callers that advance agents in
-chunks and want to show progress or save in between; the numbers are the same for every choice of chunks.
+chunks and want to show progress or save in between. The agents are the same for every choice of chunks; the exact
+figures in the log may differ in the last bit, because XLA compiles a chunk of one episode differently.
 """
 
 from __future__ import annotations

@@ -245,9 +245,7 @@ def plain():
 def test_updates_against_algorithm_1(form, hidden, optimiser, rule, rate):
     updates, capacity, period, batch_size, discount = 60, 16, 7, 8, 0.9
     config = Config(batch_size=batch_size, replay_capacity=capacity, hidden=hidden, optimiser=optimiser, form=form)
-    hparams = HParams(
-        discount=jnp.float32(discount), target_period=jnp.int32(period), learning_rate=jnp.float32(rate)
-    )
+    hparams = HParams(discount=jnp.float32(discount), target_period=jnp.int32(period), learning_rate=jnp.float32(rate))
     learner = ddqn(SPEC, config)
     state = learner.init(jax.random.key(5), hparams)
     start = layers_of(state.weights)
@@ -368,6 +366,7 @@ def short_training(config: Config, seed: int = 0, slots: int = 20, **hparams):
     return train(jax.random.key(seed))
 
 
+@pytest.mark.slow
 def test_rows_and_table_train_to_the_same_result():
     """3000 slots, epsilon falling over half of them; rounding may not lead the two forms apart."""
     settings = {"episodes": 30, "batch_size": 32, "replay_capacity": 1000}
@@ -397,12 +396,14 @@ def test_table_up_to_256_states_unless_told_otherwise():
 
 @pytest.mark.slow
 def test_ddqn_nears_the_optimum_of_the_source():
-    """Table I's source, 1000 episodes, 32 seeds: the greedy policies' exact long-run reward, within 5 % of the best."""
+    """Table I's source, 1000 episodes: the greedy policies' exact long-run reward is within 5 % of the best.
+
+    The last policy of one seed is off by 3 % on average and 5 % from seed to seed, so that 64 seeds, with a standard
+    error of 0.6 %, keep chance away from the limit.
+    """
     params = jrcjax.paper_params("source")
     best = float(exact.evaluate_policy(params, exact.optimal_policy(params)).reward)
-    count = parallel.padded(32)
-    keys = parallel.pad_agents(jax.random.split(jax.random.key(2024), 32), count)
-    run = parallel.over_agents(lambda shared, key: jrcjax.train(key, *shared, learner="ddqn")[1].policy_reward)
-    reached = np.asarray(run((params, HParams()), keys))[:32, -1]
+    _, log = jrcjax.train_agents(jax.random.split(jax.random.key(2024), 64), params, learner="ddqn")
+    reached = np.asarray(log.policy_reward[:, -1])
     assert (reached <= best + 1e-4).all()  # nothing beats the optimum
     assert reached.mean() >= best - 0.05 * abs(best)

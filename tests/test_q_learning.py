@@ -148,6 +148,7 @@ def learn(params: EnvParams, hparams: HParams) -> np.ndarray:
         (2, 0.8, 0.5, 0.7, 0.0),
     ],
 )
+@pytest.mark.slow
 def test_converges_to_the_solvers_values(levels, persistence, gamma, exponent, constant):
     params = environment(levels, persistence)
     hparams = hparams_of(discount=gamma, epsilon_end=1.0, step_exponent=exponent, step_constant=constant)

@@ -183,6 +183,7 @@ RATES, EPSILON_SLOTS = jnp.asarray([1e-4, 1e-3, 1e-2]), jnp.asarray([10.0, 30.0,
         ("ddqn", (0, 1, 2, 3)),
     ],
 )
+@pytest.mark.slow
 def test_vmap_is_one_call_after_the_other(learner, over, params):
     """Over key, environment and hyperparameters, alone and together."""
 
