@@ -51,6 +51,7 @@ sweeps: $(STAMP)  ## run parameter sweeps
 
 lint: $(STAMP)  ## check style
 	$(VENV)/bin/ruff check .
+	$(VENV)/bin/ruff format --check --quiet .
 
 types: $(STAMP)  ## check types
 	$(VENV)/bin/pyright

@@ -31,7 +31,8 @@ class ConfigurationMismatch(ValueError):
 
 def configuration(sweep: Sweep, size: Size) -> dict[str, Any]:
     """What must agree for two parts to be of one result. The number of seeds is not part of it."""
-    hparams = {name: np.asarray(value).item() for name, value in vars(HParams()).items()}
+    # Through text, so that a float32 appears as the number that was meant.
+    hparams = {name: float(str(np.asarray(value))) for name, value in vars(HParams()).items()}
     config = {name: value for name, value in asdict(Config(episodes=size.episodes)).items() if name != "episodes"}
     return json.loads(
         json.dumps(

@@ -10,7 +10,7 @@ import pytest
 from scipy import stats
 
 import jrcjax
-from jrcjax import exact, parallel, replay
+from jrcjax import exact, replay
 from jrcjax.hparams import Config, HParams
 from jrcjax.learners import Spec, ddqn
 from jrcjax.learners.ddqn import QFunction, rows_loss, table_loss
