@@ -9,6 +9,7 @@ import jax.numpy as jnp
 from flax import struct
 
 from jrcjax import slot, states
+from jrcjax.checks import require
 from jrcjax.params import EnvParams
 from jrcjax.presets import paper_params
 from jrcjax.spaces import Box, Discrete
@@ -82,6 +83,8 @@ class JRCEnv:
         self, key: Key, state: EnvState, action: Int | int, params: EnvParams
     ) -> tuple[Float, EnvState, Float, Bool, dict[str, Any]]:
         """One slot without reset: (obs, state, reward, terminated, info)."""
+        in_range = lambda a: (a >= 0) & (a < params.num_actions)  # noqa: E731
+        require("action", action, (), in_range, f"an integer from 0 to {params.num_actions - 1}", kinds="iu")
         words = jax.random.bits(key, (slot.NUM_WORDS,), jnp.uint32)
         outcome = slot.run_slot(words, state.id, jnp.asarray(action, jnp.int32), params)
         new = EnvState(outcome.next_state, state.time + 1)

@@ -9,14 +9,34 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from jrcjax import metrics, states
 from jrcjax.channel import delivered_packets
+from jrcjax.checks import require
 from jrcjax.events import event_probability
 from jrcjax.params import EnvParams
 from jrcjax.radar import mean_miss_ratio
 from jrcjax.rewards import reward
 from jrcjax.types import Float, Int
+from jrcjax.value_learning import greedy_policy
+
+__all__ = [
+    "LongRun",
+    "best_constant_action",
+    "evaluate_policy",
+    "expected_reward",
+    "greedy_policy",
+    "level_transition",
+    "miss_table",
+    "optimal_policy",
+    "packet_table",
+    "policy_of_actions",
+    "state_transition",
+    "stationary_distribution",
+    "transition_tensor",
+    "value_iteration",
+]
 
 
 class LongRun(NamedTuple):
@@ -91,7 +111,11 @@ def value_iteration(params: EnvParams, gamma: Float | float = 0.99, tolerance: f
       params: the environment.
       gamma: discount in [0, 1).
       tolerance: largest error of a value, in units of reward; float32 rounding comes on top.
+
+    Raises:
+      ValueError: naming the argument, the value and what is allowed.
     """
+    require("gamma", gamma, (), lambda x: (x >= 0) & (x < 1), "a discount in [0, 1)")
     transition, rewards = transition_tensor(params), expected_reward(params)
     gamma = jnp.asarray(gamma, jnp.float32)
     scale = gamma / (1.0 - gamma)
@@ -128,14 +152,19 @@ def optimal_policy(params: EnvParams, gamma: Float | float = 0.99) -> Float:
     return greedy_policy(value_iteration(params, gamma))
 
 
-def greedy_policy(q: Float) -> Float:
-    """Probabilities [..., S, A] of the policy that takes the largest value, the first of equals."""
-    return jax.nn.one_hot(jnp.argmax(q, axis=-1), q.shape[-1])
-
-
 def policy_of_actions(actions: Int, num_actions: int) -> Float:
     """Probabilities [..., S, A] of a deterministic policy given as actions [..., S]."""
     return jax.nn.one_hot(actions, num_actions)
+
+
+def best_constant_action(params: EnvParams) -> Float:
+    """The policy [S, A] that takes the same action in every state and earns the most in the long run."""
+    earned = stationary_distribution(params) @ expected_reward(params)
+    return policy_of_actions(jnp.full(params.num_states, jnp.argmax(earned)), params.num_actions)
+
+
+def _is_policy(policy: np.ndarray) -> bool:
+    return bool((policy >= 0).all() and (np.abs(policy.sum(axis=1) - 1.0) < 1e-4).all())
 
 
 def evaluate_policy(params: EnvParams, policy: Float) -> LongRun:
@@ -144,7 +173,12 @@ def evaluate_policy(params: EnvParams, policy: Float) -> LongRun:
     Args:
       params: the environment.
       policy: [S, A] probability of each action in each state.
+
+    Raises:
+      ValueError: naming the argument, the value and what is allowed.
     """
+    shape = (params.num_states, params.num_actions)
+    require("policy", policy, shape, _is_policy, "probabilities in [0, 1] whose rows sum to 1")
     visits = stationary_distribution(params)[:, None] * policy
     p = event_probability(params)[:, None]
     packets, miss, is_data = packet_table(params), miss_table(params)[None], _is_data(params)[None]

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import optax
@@ -34,7 +37,7 @@ class HParams:
     epsilon_slots: Float = _f32(30_000.0)
     """Slots over which epsilon falls linearly: 100 episodes of 300 slots."""
     learning_rate: Float = _f32(1e-3)
-    """nu of equation (21)."""
+    """nu of equation (21), for the named optimisers."""
     target_period: Int = struct.field(default_factory=lambda: jnp.int32(300))
     """upsilon, updates between two copies into the target network."""
     step_exponent: Float = _f32(0.7)
@@ -56,7 +59,7 @@ class Config:
     hidden: tuple[int, ...] = (24, 24)
     """Widths of the hidden layers."""
     optimiser: str | optax.GradientTransformation = "adam"
-    """One of OPTIMISERS, or an optax transformation without its learning rate, which `HParams` holds."""
+    """One of OPTIMISERS, scaled by `HParams.learning_rate`, or any optax optimiser, which brings its own rate."""
     form: str = "auto"
     """How the loss is computed: "table" evaluates the network on all states and indexes the result, "rows" on the
     samples of the mini-batch; "auto" takes the table up to 256 states. Both give the same gradient."""
@@ -66,11 +69,26 @@ class Config:
         return self.form == "table" or (self.form == "auto" and num_states <= _MAX_TABLE_STATES)
 
 
-def optimiser_of(config: Config) -> optax.GradientTransformation:
-    """The optax transformation that `config.optimiser` names, without its learning rate."""
-    if not isinstance(config.optimiser, str):
-        return config.optimiser
-    return {"adam": optax.scale_by_adam, "sgd": optax.identity, "rmsprop": optax.scale_by_rms}[config.optimiser]()
+class Optimiser(NamedTuple):
+    """An optax optimiser whose learning rate may be traced."""
+
+    init: Callable[[Any], Any]
+    step: Callable[[Any, Any, Any, HParams], tuple[Any, Any]]
+    """(gradient, state, weights, hparams) to what is added to the weights, and the next state."""
+
+
+def optimiser_of(config: Config) -> Optimiser:
+    """The optimiser of `config`; a named one takes its rate from `HParams`, equation (21)."""
+    named = {"adam": optax.scale_by_adam, "sgd": optax.identity, "rmsprop": optax.scale_by_rms}
+    optimiser = named[config.optimiser]() if isinstance(config.optimiser, str) else config.optimiser
+
+    def step(gradient: Any, state: Any, weights: Any, hparams: HParams) -> tuple[Any, Any]:
+        direction, state = optimiser.update(gradient, state, weights)
+        if not isinstance(config.optimiser, str):
+            return direction, state
+        return jax.tree.map(lambda d: -hparams.learning_rate * d, direction), state
+
+    return Optimiser(optimiser.init, step)
 
 
 def check_hparams(hparams: HParams) -> None:

@@ -18,6 +18,7 @@ import numpy as np
 from jax.sharding import AxisType, Mesh, PartitionSpec
 
 from jrcjax.checks import refuse
+from jrcjax.provenance import usable_cores
 
 BLOCK = 8
 """Agents that one device advances at once."""
@@ -25,7 +26,7 @@ BLOCK = 8
 
 def use_all_cores() -> None:
     """Makes one JAX device per core. Call it before any array is made; on an accelerator it changes nothing."""
-    jax.config.update("jax_num_cpu_devices", len(os.sched_getaffinity(0)))
+    jax.config.update("jax_num_cpu_devices", usable_cores())
 
 
 def keep_compiled() -> None:

@@ -8,7 +8,7 @@ from flax import struct
 
 from jrcjax import states
 from jrcjax.channel import Channel, check_channel, check_dynamics
-from jrcjax.checks import is_not_negative, is_probability, refuse, require, require_reading, require_type
+from jrcjax.checks import as_array, is_not_negative, is_probability, refuse, require, require_reading, require_type
 from jrcjax.radar import Radar, check_radar
 from jrcjax.types import EVENT_MODELS, MISS_CONVENTIONS, Float, Int
 
@@ -83,8 +83,9 @@ class EnvParams:
 
 
 def make_factor(prior, event_probability, persistence: float = 0.0) -> Factor:
-    """A `Factor` from plain numbers."""
-    return Factor(*(jnp.asarray(x, jnp.float32) for x in (prior, event_probability, persistence)))
+    """A `Factor` from plain numbers; `check_params` checks them together with the rest."""
+    fields = {"prior": prior, "event_probability": event_probability, "persistence": persistence}
+    return Factor(**{name: jnp.asarray(as_array(name, value, "numbers")) for name, value in fields.items()})
 
 
 def check_factor(name: str, factor: Factor) -> None:
@@ -106,7 +107,8 @@ def check_params(params: EnvParams) -> None:
     for name in FACTORS[1:]:
         check_factor(name, getattr(params, name))
     check_radar(params.radar)
-    require("reward_weights", params.reward_weights, (4,), is_not_negative, "four weights >= 0 (rho_1 to rho_4)")
+    weights = "four weights >= 0 (rho_1 to rho_4), of a signed type"
+    require("reward_weights", params.reward_weights, (4,), is_not_negative, weights, kinds="if")
     require_reading("event_model", params.event_model, EVENT_MODELS)
     require_reading("miss_convention", params.miss_convention, MISS_CONVENTIONS)
     require("count_event_packets", params.count_event_packets, (), lambda x: np.isin(x, (0, 1)), "0 or 1", kinds="iu")

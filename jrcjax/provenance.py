@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.metadata
 import os
 import platform
+import shlex
 import subprocess
 import sys
 from datetime import UTC, datetime
@@ -19,9 +20,16 @@ def versions() -> dict[str, str]:
     return {"python": platform.python_version()} | {p: importlib.metadata.version(p) for p in _PACKAGES}
 
 
+def usable_cores() -> int:
+    """Cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
 def machine() -> dict[str, Any]:
     """Processor, usable cores and operating system."""
-    return {"cpu": _cpu_name(), "cores": len(os.sched_getaffinity(0)), "system": platform.system()}
+    return {"cpu": _cpu_name(), "cores": usable_cores(), "system": platform.system()}
 
 
 def _cpu_name() -> str:
@@ -36,10 +44,8 @@ def _cpu_name() -> str:
 def provenance() -> dict[str, Any]:
     """Command, time, versions, machine, and the commit of the source if it is in a git checkout."""
     modified = _git("status", "--porcelain", "--untracked-files=no")
-    main = getattr(sys.modules["__main__"], "__spec__", None)
-    module = main.name.removesuffix(".__main__") if main else Path(sys.argv[0]).name
     return {
-        "command": " ".join(["python", "-m", module, *sys.argv[1:]]),
+        "command": shlex.join(["python", *sys.orig_argv[1:]]),
         "finished": datetime.now(UTC).isoformat(timespec="seconds"),
         "versions": versions(),
         "machine": machine(),
@@ -49,5 +55,9 @@ def provenance() -> dict[str, Any]:
 
 
 def _git(*args: str) -> str | None:
-    done = subprocess.run(["git", "-C", str(Path(__file__).parent), *args], capture_output=True, text=True, check=False)
+    command = ["git", "-C", str(Path(__file__).parent), *args]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+    except OSError:  # no git on this machine
+        return None
     return done.stdout.strip() if done.returncode == 0 else None

@@ -207,7 +207,7 @@ def fresh_miss_ratio(key: Key, mode: int, radar: Radar) -> Float:
 def _fresh_of(key: Key, mode: Int, radar: Radar) -> Float:
     """`fresh_miss_ratio` for a mode that is an array; a mode's number of slots is static, so each has its branch."""
     modes = [functools.partial(fresh_miss_ratio, mode=m, radar=radar) for m in range(radar.num_modes)]
-    return jax.lax.switch(mode, modes, key)
+    return jnp.where((mode >= 0) & (mode < radar.num_modes), jax.lax.switch(mode, modes, key), jnp.nan)
 
 
 def miss_ratio(

@@ -7,6 +7,8 @@ figures in the log may differ in the last bit, because XLA compiles a chunk of o
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax
@@ -145,6 +147,7 @@ def train(
       ValueError: naming the field, the value and what is allowed, before anything compiles.
     """
     hparams, config = _checked(env_params, hparams, config)
+    _check_keys(key, 0, "one key, as jax.random.key returns it; use vmap or train_agents for several")
     rule = learner_for(learner, env_params, config)
     agent = init_agent(key, hparams, rule)
     return run_episodes(agent, 0, config.episodes, env_params, hparams, rule)
@@ -174,17 +177,31 @@ def train_agents(
       ValueError: naming the field, the value and what is allowed, before anything compiles.
     """
     hparams, config = _checked(env_params, hparams, config)
-    if keys.ndim != 1 or keys.shape[0] < 1:
-        refuse("keys", f"shape {keys.shape}", "an array of at least one key, as jax.random.split returns it")
-    rule = learner_for(learner, env_params, config)
+    _check_keys(keys, 1, "an array of at least one key, as jax.random.split returns it")
+    run = _many_agents(learner, Spec(env_params.shape, env_params.num_actions), config)
+    done = run((env_params, hparams), pad_agents(keys, padded(keys.shape[0])))
+    return jax.tree.map(lambda leaf: leaf[: keys.shape[0]], done)
+
+
+@functools.cache
+def _many_agents(learner: str | LearnerFactory, spec: Spec, config: Config) -> Callable:
+    """The same compiled function for the same learner, shapes and settings."""
+    rule = make_learner(learner, spec, config)
 
     def one(shared, key):
         env_params, hparams = shared
         return run_episodes(init_agent(key, hparams, rule), 0, config.episodes, env_params, hparams, rule)
 
-    lanes = pad_agents(keys, padded(keys.shape[0]))
-    done = over_agents(one)((env_params, hparams), lanes)
-    return jax.tree.map(lambda leaf: leaf[: keys.shape[0]], done)
+    return over_agents(one)
+
+
+def _check_keys(keys: Key, dimensions: int, allowed: str) -> None:
+    if not isinstance(keys, jax.Array):
+        refuse("key", f"object of type {type(keys).__name__}", allowed)
+    typed = jnp.issubdtype(keys.dtype, jax.dtypes.prng_key)
+    shape = keys.shape if typed else keys.shape[:-1]  # an old-style key is an array of two words
+    if len(shape) != dimensions or 0 in shape:
+        refuse("key", f"shape {keys.shape}", allowed)
 
 
 def _checked(env_params: EnvParams, hparams: HParams | None, config: Config | None) -> tuple[HParams, Config]:

@@ -5,6 +5,8 @@ Functions work on tables over all states, [S, A], or on rows of a batch, [B, A];
 
 from __future__ import annotations
 
+import chex
+import jax
 import jax.numpy as jnp
 
 from jrcjax.types import Float, Int
@@ -12,6 +14,8 @@ from jrcjax.types import Float, Int
 
 def double_q_value(q_online: Float, q_target: Float) -> Float:
     """Q(s', argmax_a Q(s', a; theta); theta'), the value in equation (15); [N, A], [N, A] to [N]."""
+    chex.assert_equal_shape([q_online, q_target])
+    chex.assert_rank(q_online, 2)
     best = jnp.argmax(q_online, axis=-1, keepdims=True)
     return jnp.take_along_axis(q_target, best, axis=-1)[..., 0]
 
@@ -23,6 +27,7 @@ def td_target(reward: Float, discount: Float, next_value: Float) -> Float:
 
 def squared_td_loss(td_error: Float) -> Float:
     """Mean of (y - Q)^2 over the mini-batch [B], equations (16) and (20)."""
+    chex.assert_rank(td_error, 1)  # a mean over a broadcast pair would be silently wrong
     return jnp.mean(jnp.square(td_error))
 
 
@@ -34,3 +39,8 @@ def q_learning_error(q: Float, state: Int, action: Int, reward: Float, next_stat
 def robbins_monro_step(visits: Int, exponent: Float) -> Float:
     """Step size n^-exponent after n >= 1 visits; satisfies equation (14) for exponents in (0.5, 1]."""
     return jnp.maximum(visits, 1).astype(jnp.float32) ** -exponent
+
+
+def greedy_policy(q: Float) -> Float:
+    """Probabilities [..., S, A] of the policy that takes the largest value, the first of equals."""
+    return jax.nn.one_hot(jnp.argmax(q, axis=-1), q.shape[-1])

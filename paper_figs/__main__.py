@@ -31,6 +31,11 @@ class Options:
     """Table of parameters: paper or paper_table."""
 
 
+def results_folder(out: Path, size: Size) -> Path:
+    """Where results of one preset and length lie, so that runs of different ones don't meet."""
+    return out / "results" / f"{size.preset}-{size.episodes}-episodes"
+
+
 def make_figures(numbers: tuple[int, ...], size: Size, out: Path, console: Console) -> list[Path]:
     """Runs the sweeps that are missing, then writes all files of the figures with these numbers.
 
@@ -51,7 +56,7 @@ def make_figures(numbers: tuple[int, ...], size: Size, out: Path, console: Conso
     wanted = [figure for figure in FIGURES if not numbers or figure.number in numbers]
     written, pictures, judgements, optima, manifests = [], {}, [], [], {}
     for figure in wanted:
-        folder = run_sweep(SWEEPS[figure.sweep], size, out / "results", console, resume=True)
+        folder = run_sweep(SWEEPS[figure.sweep], size, results_folder(out, size), console, resume=True)
         data = store.load(folder, size.seeds)
         table = figure.table(data)
         table.to_csv(out / f"{figure.name}.csv", index=False, float_format="%.6g")

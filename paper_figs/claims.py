@@ -77,46 +77,50 @@ def gaps(data: xr.Dataset, algorithm: str) -> np.ndarray:
     return (optimum - reward) / abs(optimum)
 
 
+def _mean(episodes: np.ndarray) -> np.ndarray:
+    """Mean over the episodes of [seeds, episodes]; NaN where there are none."""
+    return episodes.mean(axis=1) if episodes.shape[1] else np.full(len(episodes), np.nan)
+
+
 def mean_reward(data: xr.Dataset, algorithm: str) -> np.ndarray:
     """Mean simulated reward per slot over all episodes at the first point, [seeds]."""
     return data["reward"].sel(algorithm=algorithm).isel(point=0).mean("episode").values
 
 
-def source_claims(data: xr.Dataset) -> list[Judgement]:
+def source_claims(data: xr.Dataset, tolerance: float = TOLERANCE) -> list[Judgement]:
     """C1 and the source's part of C2, from the results of Fig. 5(a).
 
-    Needs more than 400 episodes, because the statements are about what happens after episodes 200 and 400.
+    The statements are about what happens after episodes 200 and 400; a shorter run leaves them undecided, without a
+    value. Another `tolerance` shows how far verdicts depend on it.
     """
-    if data.sizes["episode"] <= 400:
-        return []
     ddqn, q_learning = gaps(data, "ddqn"), gaps(data, "q_learning")
     below = mean_reward(data, "round_robin") - np.minimum(mean_reward(data, "ddqn"), mean_reward(data, "q_learning"))
     return [
         judge(
             "C1 (reached)",
-            "DDQN reaches the optimal policy after about 200 episodes",
+            "DDQN has reached the optimal policy after about 200 episodes",
             "mean gap in episodes 201 to 400",
-            ddqn[:, 200:400].mean(axis=1),
+            _mean(ddqn[:, 200:400]),
             "<=",
-            TOLERANCE,
+            tolerance,
             "5a",
         ),
         judge(
             "C1 (stable)",
             "DDQN is stable at the optimal policy after 400 episodes",
             "mean gap after episode 400",
-            ddqn[:, 400:].mean(axis=1),
+            _mean(ddqn[:, 400:]),
             "<=",
-            TOLERANCE,
+            tolerance,
             "5a",
         ),
         judge(
             "C2 (Q-learning)",
             "Q-learning does not reach the optimal policy in the source",
             "mean gap after episode 400",
-            q_learning[:, 400:].mean(axis=1),
+            _mean(q_learning[:, 400:]),
             ">=",
-            TOLERANCE,
+            tolerance,
             "5a",
         ),
         judge(

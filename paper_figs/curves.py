@@ -15,10 +15,10 @@ COLUMNS = ["figure", "panel", "algorithm", "x", "mean", "ci_low", "ci_high", "n_
 
 
 def table(data: xr.Dataset, figure: str, panel: str) -> pd.DataFrame:
-    """The plotted numbers: mean reward per slot in bins of consecutive episodes, over seeds; and the optimum.
+    """The plotted numbers: mean reward per slot in bins of consecutive episodes, over seeds; and two exact lines.
 
-    `x` is the last episode of a bin. The interval is Student's t at 95 % over seeds. The optimum is exact: it has no
-    seeds (n_seeds 0) and its interval is itself.
+    `x` is the last episode of a bin. The interval is Student's t at 95 % over seeds. The optimum and the best
+    constant action are exact: they have no seeds (n_seeds 0) and their interval is themselves.
     """
     episodes = data.sizes["episode"]
     width = bins_of(episodes)
@@ -31,8 +31,9 @@ def table(data: xr.Dataset, figure: str, panel: str) -> pd.DataFrame:
             (figure, panel, name, int(e), m, low, high, mean.n_seeds)
             for e, m, low, high in zip(x, mean.mean, mean.low, mean.high, strict=True)
         ]
-    optimum = float(data["optimum_reward"].isel(point=0))
-    rows += [(figure, panel, "optimum", int(e), optimum, optimum, optimum, 0) for e in x]
+    for name in ("optimum", "constant"):
+        reward = float(data[f"{name}_reward"].isel(point=0))
+        rows += [(figure, panel, name, int(e), reward, reward, reward, 0) for e in x]
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
@@ -52,17 +53,20 @@ def draw(numbers: pd.DataFrame, title: str) -> Figure:
     _enlarge(axes, numbers)
     # Below the axes, where it can hide no curve.
     figure.legend(
-        *axes.get_legend_handles_labels(), loc="outside lower center", ncols=4, columnspacing=1.0, handlelength=1.7
+        *axes.get_legend_handles_labels(), loc="outside lower center", ncols=3, columnspacing=1.0, handlelength=1.7
     )
     return figure
 
 
-def _optimum(numbers: pd.DataFrame) -> float:
-    return float(numbers.loc[numbers["algorithm"] == "optimum", "mean"].to_numpy()[0])
+def _exact(numbers: pd.DataFrame, name: str) -> float:
+    return float(numbers.loc[numbers["algorithm"] == name, "mean"].to_numpy()[0])
 
 
 def _plot(axes: Axes, numbers: pd.DataFrame) -> None:
-    axes.axhline(_optimum(numbers), color="black", linestyle="--", linewidth=0.9, label="optimum (exact)", zorder=3)
+    axes.axhline(_exact(numbers, "optimum"), color="black", linestyle="--", label="optimum (exact)", zorder=3)
+    axes.axhline(
+        _exact(numbers, "constant"), color="0.4", linestyle=":", label="best constant action (exact)", zorder=3
+    )
     for name, look in style.LOOKS.items():
         curve = numbers[numbers.algorithm == name]
         if curve.empty:
@@ -76,8 +80,8 @@ def _enlarge(axes: Axes, numbers: pd.DataFrame) -> None:
     """Enlarges what lies near the optimum in the second half, if the full range hides it."""
     late = numbers.query("x > x.max() / 2")
     span = numbers["mean"].max() - numbers["mean"].min()
-    near = late.loc[(late["mean"] - _optimum(numbers)).abs() < 0.15 * span]
-    if set(near["algorithm"]) <= {"optimum"}:
+    near = late.loc[(late["mean"] - _exact(numbers, "optimum")).abs() < 0.15 * span]
+    if set(near["algorithm"]) <= {"optimum", "constant"}:
         return
     inset = axes.inset_axes((0.3, 0.26, 0.66, 0.42))
     _plot(inset, numbers)

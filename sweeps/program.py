@@ -43,11 +43,20 @@ def points_of(sweep: Sweep, preset: str) -> EnvParams:
     return jax.tree.map(lambda *leaves: jnp.stack(leaves), *points)
 
 
-def optimum_of(points: EnvParams) -> exact.LongRun:
-    """Exact long-run figures of the optimal policy at each point, [points] each."""
+class Reference(NamedTuple):
+    """Exact long-run figures at each point, [points] each."""
 
-    def at(params: EnvParams) -> exact.LongRun:
-        return exact.evaluate_policy(params, exact.optimal_policy(params))
+    optimum: exact.LongRun
+    constant: exact.LongRun
+    """Of the best policy that ignores the state."""
+
+
+def reference_of(points: EnvParams) -> Reference:
+    """What learners are held against at each point."""
+
+    def at(params: EnvParams) -> Reference:
+        policies = (exact.optimal_policy(params), exact.best_constant_action(params))
+        return Reference(*(exact.evaluate_policy(params, policy) for policy in policies))
 
     return jax.jit(jax.vmap(at))(points)
 

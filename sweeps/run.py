@@ -12,7 +12,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 
 from jrcjax.training import Log
 from sweeps import store
-from sweeps.program import optimum_of, points_of, run_block
+from sweeps.program import points_of, reference_of, run_block
 from sweeps.sweep import Size, Sweep
 
 SEEDS_PER_PART = 16
@@ -63,7 +63,7 @@ def run_sweep(sweep: Sweep, size: Size, out: Path, console: Console, *, resume: 
         return folder
     folder.mkdir(parents=True, exist_ok=True)
     points = points_of(sweep, size.preset)
-    optimum = optimum_of(points)
+    reference = reference_of(points)
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -80,6 +80,6 @@ def run_sweep(sweep: Sweep, size: Size, out: Path, console: Console, *, resume: 
                 logs.append(chunk.log)
                 progress.advance(task, chunk.episodes * len(seeds))
             whole = jax.tree.map(lambda *parts: np.concatenate(parts, axis=-1), *logs)
-            store.write_part(folder, seeds, store.dataset(sweep, size, seeds, whole, optimum))
+            store.write_part(folder, seeds, store.dataset(sweep, size, seeds, whole, reference))
             store.write_manifest(folder, sweep, size)
     return folder

@@ -6,6 +6,8 @@ configuration that made it; a folder never mixes configurations.
 
 from __future__ import annotations
 
+import dataclasses
+import hashlib
 import json
 import os
 import tempfile
@@ -13,13 +15,16 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import jax
 import numpy as np
 import xarray as xr
 
 from jrcjax.exact import LongRun
 from jrcjax.hparams import Config, HParams
+from jrcjax.params import EnvParams
 from jrcjax.provenance import provenance
 from jrcjax.training import Log
+from sweeps.program import Reference, points_of
 from sweeps.sweep import Size, Sweep
 
 MANIFEST = "manifest.json"
@@ -27,6 +32,13 @@ MANIFEST = "manifest.json"
 
 class ConfigurationMismatch(ValueError):
     """A folder holds results of another configuration."""
+
+
+def digest_of(points: EnvParams) -> str:
+    """Hash of every number of the environments, but for the bank, which follows from the others."""
+    bare = dataclasses.replace(points, radar=dataclasses.replace(points.radar, miss_bank=np.zeros(0)))
+    content = b"".join(np.asarray(leaf).tobytes() for leaf in jax.tree.leaves(bare))
+    return hashlib.sha256(content + repr(jax.tree.structure(bare)).encode()).hexdigest()[:16]
 
 
 def configuration(sweep: Sweep, size: Size) -> dict[str, Any]:
@@ -42,6 +54,7 @@ def configuration(sweep: Sweep, size: Size) -> dict[str, Any]:
                 "episodes": size.episodes,
                 "learners": sweep.learners,
                 "x": {sweep.x_name: sweep.x_values},
+                "environments": digest_of(points_of(sweep, size.preset)),
                 "hparams": hparams,
                 "config": config,
             }
@@ -55,28 +68,30 @@ def check_folder(folder: Path, sweep: Sweep, size: Size) -> None:
     Raises:
       ConfigurationMismatch: naming each field that differs, with both values.
     """
-    manifest = folder / MANIFEST
-    if not manifest.exists():
-        return
-    found, wanted = json.loads(manifest.read_text())["configuration"], configuration(sweep, size)
-    differing = [
-        f"{key}: {json.dumps(found.get(key))} there, {json.dumps(wanted.get(key))} wanted"
-        for key in sorted({*found, *wanted})
-        if found.get(key) != wanted.get(key)
-    ]
-    if differing:
-        raise ConfigurationMismatch(
-            f"{folder} holds results of another configuration ({'; '.join(differing)}); "
-            "choose another --out, or remove the folder"
-        )
+    wanted = configuration(sweep, size)
+    for path in sorted(folder.glob("seeds-*.nc")):
+        with xr.open_dataset(path, engine="h5netcdf") as part:
+            found = json.loads(part.attrs["configuration"])
+        differing = [
+            f"{key}: {json.dumps(found.get(key))} there, {json.dumps(wanted.get(key))} wanted"
+            for key in sorted({*found, *wanted})
+            if found.get(key) != wanted.get(key)
+        ]
+        if differing:
+            raise ConfigurationMismatch(
+                f"{path} holds results of another configuration ({'; '.join(differing)}); "
+                "choose another --out, or remove the folder"
+            )
 
 
-def dataset(sweep: Sweep, size: Size, seeds: range, log: dict[str, Log], optimum: LongRun) -> xr.Dataset:
+def dataset(sweep: Sweep, size: Size, seeds: range, log: dict[str, Log], exact: Reference) -> xr.Dataset:
     """Results of some seeds with named dimensions: algorithm, point, seed, episode (from 1)."""
     dims = ("algorithm", "point", "seed", "episode")
     stacked = {name: np.stack([getattr(log[learner], name) for learner in sweep.learners]) for name in Log._fields}
     variables: dict[str, Any] = {name: (dims, values) for name, values in stacked.items()}
-    variables |= {f"optimum_{name}": (("point",), np.asarray(getattr(optimum, name))) for name in LongRun._fields}
+    for policy in Reference._fields:
+        run: LongRun = getattr(exact, policy)
+        variables |= {f"{policy}_{name}": (("point",), np.asarray(value)) for name, value in run._asdict().items()}
     coords = {
         "algorithm": list(sweep.learners),
         "point": np.arange(len(sweep.x_values)),
@@ -84,7 +99,8 @@ def dataset(sweep: Sweep, size: Size, seeds: range, log: dict[str, Log], optimum
         "seed": np.array(seeds),
         "episode": np.arange(1, size.episodes + 1),
     }
-    return xr.Dataset(variables, coords, {"configuration": json.dumps(configuration(sweep, size), sort_keys=True)})
+    about = {"configuration": configuration(sweep, size), "provenance": provenance()}
+    return xr.Dataset(variables, coords, {name: json.dumps(value, sort_keys=True) for name, value in about.items()})
 
 
 def part_path(folder: Path, seeds: range) -> Path:

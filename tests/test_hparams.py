@@ -135,13 +135,19 @@ def test_defaults_are_table_1():
     assert (config.optimiser, config.form) == ("adam", "auto")
 
 
-def test_optimisers_leave_the_learning_rate_out():
+def test_named_optimisers_take_their_rate_from_the_hyperparameters():
     gradient = jnp.asarray([3.0, -0.5])
     for name, wanted in [("sgd", gradient), ("adam", jnp.sign(gradient))]:
         optimiser = optimiser_of(Config(optimiser=name))
+        hparams = HParams(learning_rate=jnp.float32(0.25))
         with jax.numpy_dtype_promotion("standard"):  # optax mixes floats with integer counts
-            direction, _ = optimiser.update(gradient, optimiser.init(gradient))
+            step, _ = optimiser.step(gradient, optimiser.init(gradient), gradient, hparams)
         # 1 - 0.999 in float32 is off by 1.3e-5 of itself, of which Adam takes the root.
-        np.testing.assert_allclose(direction, wanted, rtol=1e-5)
-    own = optax.trace(0.5)
-    assert optimiser_of(Config(optimiser=own)) is own
+        np.testing.assert_allclose(step, -0.25 * wanted, rtol=1e-5)
+
+
+def test_an_optimiser_of_ones_own_brings_its_rate():
+    gradient = jnp.asarray([3.0, -0.5])
+    optimiser = optimiser_of(Config(optimiser=optax.sgd(0.125)))
+    step, _ = optimiser.step(gradient, optimiser.init(gradient), gradient, HParams(learning_rate=jnp.float32(9.0)))
+    np.testing.assert_array_equal(step, -0.125 * gradient)

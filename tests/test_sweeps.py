@@ -11,9 +11,10 @@ from rich.console import Console
 
 import jrcjax
 from jrcjax import exact
+from jrcjax.provenance import provenance
 from sweeps import store
 from sweeps.__main__ import main
-from sweeps.program import chunk_of, optimum_of, points_of
+from sweeps.program import chunk_of, points_of, reference_of
 from sweeps.registry import SWEEPS
 from sweeps.run import SEEDS_PER_PART, blocks, run_sweep
 from sweeps.sweep import Size, size_of
@@ -66,6 +67,27 @@ def test_results_of_another_configuration_are_refused_with_the_difference(folder
         run_sweep(FIG5A, Size(seeds=3, episodes=4), folder.parent, QUIET, resume=True)
 
 
+def test_a_part_of_another_configuration_is_refused_also_without_a_manifest(tmp_path):
+    folder = run_sweep(FIG5A, Size(seeds=1, episodes=2), tmp_path, QUIET, resume=False)
+    (folder / store.MANIFEST).unlink()
+    with pytest.raises(store.ConfigurationMismatch, match='preset: "paper" there, "paper_table" wanted'):
+        run_sweep(FIG5A, Size(seeds=2, episodes=2, preset="paper_table"), tmp_path, QUIET, resume=True)
+
+
+def test_the_digest_sees_every_number_of_an_environment():
+    points = points_of(FIG5A, "paper")
+    other = points.replace(reward_weights=points.reward_weights.at[0, 2].add(1e-6))
+    assert store.digest_of(points) == store.digest_of(points_of(FIG5A, "paper"))
+    assert store.digest_of(points) != store.digest_of(other)
+
+
+def test_results_know_how_they_were_made_without_git(monkeypatch):
+    monkeypatch.setenv("PATH", "")
+    made = provenance()
+    assert made["git_commit"] is None
+    assert made["versions"]["jax"]
+
+
 def test_existing_results_are_not_touched_without_resume(folder):
     with pytest.raises(ValueError, match="--resume"):
         run_sweep(FIG5A, SIZE, folder.parent, QUIET, resume=False)
@@ -116,12 +138,12 @@ def test_the_program_is_compiled_once_for_all_blocks(tmp_path):
     assert compiled.count("jit(checked)") == 2  # one program starts the agents, one advances them
 
 
-def test_the_optimum_of_stacked_points_is_that_of_each_alone():
+def test_the_reference_of_stacked_points_is_that_of_each_alone():
     points = points_of(FIG5A, "paper_table")
     assert points.radar.density.shape == (1,)
     params = jrcjax.paper_params("source", "paper_table")
     best = exact.evaluate_policy(params, exact.optimal_policy(params))
-    np.testing.assert_allclose(optimum_of(points).reward[0], best.reward, rtol=1e-6)
+    np.testing.assert_allclose(reference_of(points).optimum.reward[0], best.reward, rtol=1e-6)
 
 
 @pytest.mark.parametrize("field", ["seeds", "episodes"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from jrcjax.checks import refuse
 from jrcjax.hparams import Config
 from jrcjax.learners.base import Learner, LearnerFactory, Spec
 from jrcjax.learners.ddqn import ddqn
@@ -23,4 +24,6 @@ def make_learner(learner: str | LearnerFactory, spec: Spec, config: Config) -> L
     if isinstance(learner, str):
         choice("learner", learner, tuple(LEARNERS))
         learner = LEARNERS[learner]
+    if not callable(learner):
+        refuse("learner", str(learner), f"{', '.join(map(repr, LEARNERS))}, or a function that makes a Learner")
     return learner(spec, config)

@@ -13,14 +13,13 @@ import jax.numpy as jnp
 import optax
 
 from jrcjax import exploration, replay, states
-from jrcjax.exact import greedy_policy
 from jrcjax.hparams import Config, HParams, optimiser_of
 from jrcjax.learners.base import Learner, Spec
 from jrcjax.networks import QNetwork
 from jrcjax.replay import Transition
 from jrcjax.schedules import epsilon
 from jrcjax.types import Float, Int, Words
-from jrcjax.value_learning import double_q_value, squared_td_loss, td_target
+from jrcjax.value_learning import double_q_value, greedy_policy, squared_td_loss, td_target
 
 
 class DDQNState(NamedTuple):
@@ -103,8 +102,7 @@ def ddqn(spec: Spec, config: Config) -> Learner:
         due = slot % hparams.target_period == 0
         target = jax.tree.map(lambda new, old: jnp.where(due, new, old), as_target(state.weights), state.target)
         gradient = jax.grad(loss)(state.weights, target, batch, hparams.discount)
-        direction, optimiser_state = optimiser.update(gradient, state.optimiser, state.weights)
-        step = jax.tree.map(lambda d: -hparams.learning_rate * d, direction)
+        step, optimiser_state = optimiser.step(gradient, state.optimiser, state.weights, hparams)
         return DDQNState(optax.apply_updates(state.weights, step), target, optimiser_state, ring)
 
     return Learner(

@@ -7,14 +7,13 @@ from typing import NamedTuple
 import jax.numpy as jnp
 
 from jrcjax import exploration
-from jrcjax.exact import greedy_policy
 from jrcjax.hparams import Config, HParams
 from jrcjax.learners.base import Learner, Spec
 from jrcjax.replay import Transition
 from jrcjax.schedules import epsilon
 from jrcjax.states import num_states
 from jrcjax.types import Float, Int
-from jrcjax.value_learning import q_learning_error, robbins_monro_step
+from jrcjax.value_learning import greedy_policy, q_learning_error, robbins_monro_step
 
 
 class QState(NamedTuple):
