@@ -9,7 +9,7 @@ from flax import struct
 from jrcjax import states
 from jrcjax.channel import Channel, check_channel, check_dynamics
 from jrcjax.checks import as_array, is_not_negative, is_probability, refuse, require, require_reading, require_type
-from jrcjax.radar import Radar, check_radar
+from jrcjax.radar import Radar, check_bank, check_radar
 from jrcjax.types import EVENT_MODELS, MISS_CONVENTIONS, Float, Int
 
 FACTORS = ("channel", "road", "weather", "speed", "nearby")
@@ -107,6 +107,7 @@ def check_params(params: EnvParams) -> None:
     for name in FACTORS[1:]:
         check_factor(name, getattr(params, name))
     check_radar(params.radar)
+    check_bank(params.radar)
     weights = "four weights >= 0 (rho_1 to rho_4), of a signed type"
     require("reward_weights", params.reward_weights, (4,), is_not_negative, weights, kinds="if")
     require_reading("event_model", params.event_model, EVENT_MODELS)

@@ -35,6 +35,19 @@ from jrcjax.types import COUNT_MODELS, COUNTING_RULES, DISTANCES, PLACEMENTS, Fl
 REFERENCE_SIDE = 45.0
 """Side in m of the square in which the density omega counts objects."""
 _UNLIMITED = 2**31 - 1  # stands for slots that are still to be counted
+_BANK_FIELDS = (
+    "bandwidth",
+    "slope",
+    "max_intermediate_frequency",
+    "density",
+    "class_share",
+    "size_mean",
+    "size_std",
+    "distance",
+    "counting_rule",
+    "count_model",
+    "bank_seed",
+)
 _CHUNK = 256  # placements handled at once while a bank is built: about 10 MB of boxes
 
 
@@ -66,6 +79,8 @@ class Radar:
     """[] seed of the bank's placements."""
     miss_bank: Float
     """[K, B] miss ratios of B independent placements per mode; derived, see `replace`."""
+    bank_inputs: Float
+    """[n] the numbers that the bank was built from, by which `check_params` knows one that no longer fits."""
     max_objects: tuple[int, ...] = struct.field(pytree_node=False)
     """K slots for objects; a count above it gives NaN, never a silently smaller number."""
     placements: str = struct.field(pytree_node=False, default="bank")
@@ -101,7 +116,7 @@ def _replace(self: Radar, **changes) -> Radar:
         name: jnp.asarray(value, getattr(self, name).dtype) for name, value in changes.items() if name != "placements"
     }
     new = dataclasses.replace(new, **given, max_objects=_capacities(new, self.max_objects))
-    return dataclasses.replace(new, miss_bank=build_bank(new, bank_size))
+    return _with_bank(new, bank_size)
 
 
 # After the class, because flax's decorator sets a `replace` of its own.
@@ -159,6 +174,7 @@ def make_radar(
         **{name: jnp.int32(index) for name, index in readings.items()},
         bank_seed=jnp.int32(bank_seed),
         miss_bank=jnp.zeros((*modes, bank_size)),
+        bank_inputs=jnp.zeros(0),
         max_objects=(_UNLIMITED,) * math.prod(modes),
         placements=placements,
     )
@@ -167,7 +183,7 @@ def make_radar(
     require("radar.max_density", largest, (), is_positive, "a number > 0")
     scale = max(float(largest / arrays["density"]), 1.0)
     radar = dataclasses.replace(radar, max_objects=_capacities(radar, scale=scale))
-    return dataclasses.replace(radar, miss_bank=build_bank(radar, bank_size))
+    return _with_bank(radar, bank_size)
 
 
 def mean_count(radar: Radar) -> Float:
@@ -262,7 +278,18 @@ _jitted_fresh = jax.jit(fresh_miss_ratio, static_argnums=1)
 
 def build_bank(radar: Radar, size: int) -> Float:
     """Miss ratios of `size` independent placements per mode, [K, size]."""
-    return _build_bank(dataclasses.replace(radar, miss_bank=jnp.zeros((radar.num_modes, 0))), size)
+    bare = dataclasses.replace(radar, miss_bank=jnp.zeros((radar.num_modes, 0)), bank_inputs=jnp.zeros(0))
+    return _build_bank(bare, size)
+
+
+def _with_bank(radar: Radar, size: int) -> Radar:
+    return dataclasses.replace(radar, miss_bank=build_bank(radar, size), bank_inputs=bank_inputs(radar))
+
+
+def bank_inputs(radar: Radar) -> Float:
+    """All numbers that a bank depends on, [n]."""
+    fields = [getattr(radar, name) for name in _BANK_FIELDS]
+    return jnp.concatenate([jnp.ravel(jnp.asarray(field)).astype(jnp.float32) for field in fields])
 
 
 @jax.jit(static_argnums=1)
@@ -317,6 +344,15 @@ def check_radar(radar: Radar) -> None:
         "radar.miss_bank", radar.miss_bank, (*modes, None), is_probability, "ratios in [0, 1], as `replace` draws them"
     )
     _check_count(radar)
+
+
+def check_bank(radar: Radar) -> None:
+    """Refuses a bank built for other parameters, as `dataclasses.replace` or a tree operation leaves it behind."""
+    if is_traced(*jax.tree.leaves(radar)):
+        return
+    wanted = np.concatenate([np.ravel(np.asarray(getattr(radar, name), np.float32)) for name in _BANK_FIELDS])
+    if not np.array_equal(wanted, np.asarray(radar.bank_inputs)):
+        refuse("radar.miss_bank", "built for other parameters", "the bank that `radar.replace(...)` builds")
 
 
 def _check_count(radar: Radar) -> None:

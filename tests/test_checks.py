@@ -4,6 +4,7 @@ import dataclasses
 from contextlib import contextmanager
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -204,6 +205,8 @@ def test_valid_random_parameters_pass(masses, events, persistence, density, weig
     params = put(params, "speed.event_probability", np.asarray(events[: len(prior)], np.float32))
     params = put(params, "speed.persistence", np.float32(persistence))
     params = put(params, "radar.density", np.float32(max(density, 0.51)))
+    # Stands for the bank that `replace` would build, which takes a second.
+    params = put(params, "radar.bank_inputs", radar.bank_inputs(params.radar))
     params = put(params, "reward_weights", np.asarray(weights, np.float32))
     params = put(params, "max_steps_in_episode", limit)
     with nothing_compiles():
@@ -279,3 +282,10 @@ def test_shapes_are_checked_inside_a_trace(target):
 
 def test_public_name():
     assert jrcjax.check_params is check_params
+
+
+def test_a_bank_built_for_other_parameters_is_refused(target):
+    stale = dataclasses.replace(target.radar, density=jnp.float32(40.0))
+    with pytest.raises(ValueError, match=r"^radar\.miss_bank: 'built for other parameters'; allowed: "):
+        check_params(target.replace(radar=stale))
+    check_params(target.replace(radar=target.radar.replace(density=jnp.float32(40.0))))
