@@ -1,4 +1,4 @@
-"""The multi-mode radar: parameters, the miss-detection ratio of one slot (5), and the bank of placements.
+"""The multi-mode radar: its parameters and the miss-detection ratio of one slot, equation (5).
 
 The bank holds the miss ratios of many independent placements per mode, so that a slot costs one look-up. It is part
 of `Radar` and is built anew whenever `Radar.replace` changes anything that it depends on; under `jit` and `vmap` it is
@@ -8,7 +8,6 @@ built inside the same program.
 from __future__ import annotations
 
 import dataclasses
-import functools
 import math
 
 import jax
@@ -16,7 +15,8 @@ import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
-from jrcjax import chirp, detection, rng
+from jrcjax import rng
+from jrcjax.bank import BANK_FIELDS, bank_inputs, build_bank, fresh_miss_ratio, fresh_miss_ratio_of, mean_count
 from jrcjax.checks import (
     as_array,
     is_distribution,
@@ -29,26 +29,10 @@ from jrcjax.checks import (
     require_reading,
     require_type,
 )
-from jrcjax.placement import ObjectClasses, object_count, place_objects
+from jrcjax.placement import ObjectClasses
 from jrcjax.types import COUNT_MODELS, COUNTING_RULES, DISTANCES, PLACEMENTS, Float, Int, Key, Words, choice
 
-REFERENCE_SIDE = 45.0
-"""Side in m of the square in which the density omega counts objects."""
 _UNLIMITED = 2**31 - 1  # stands for slots that are still to be counted
-_BANK_FIELDS = (
-    "bandwidth",
-    "slope",
-    "max_intermediate_frequency",
-    "density",
-    "class_share",
-    "size_mean",
-    "size_std",
-    "distance",
-    "counting_rule",
-    "count_model",
-    "bank_seed",
-)
-_CHUNK = 256  # placements handled at once while a bank is built: about 10 MB of boxes
 
 
 @struct.dataclass
@@ -186,12 +170,6 @@ def make_radar(
     return _with_bank(radar, bank_size)
 
 
-def mean_count(radar: Radar) -> Float:
-    """Mean number of objects in the square of each mode, [K]: omega (R_max / 45 m)^2."""
-    reach = chirp.maximum_range(radar.slope, radar.max_intermediate_frequency)
-    return radar.density * (reach / REFERENCE_SIDE) ** 2
-
-
 def _concrete_counts(radar: Radar) -> np.ndarray:
     with jax.ensure_compile_time_eval():  # also where a trace builds a radar from known numbers
         return np.asarray(mean_count(radar), np.float64)
@@ -206,24 +184,6 @@ def _capacities(radar: Radar, at_least: tuple[int, ...] = (), scale: float = 1.0
     if len(at_least) != len(needed):
         return tuple(needed)
     return tuple(max(pair) for pair in zip(needed, at_least, strict=True))
-
-
-def fresh_miss_ratio(key: Key, mode: int, radar: Radar) -> Float:
-    """p_k of one new placement in mode `mode` (static), a scalar; equation (5)."""
-    count_key, place_key = jax.random.split(key)
-    count = object_count(count_key, mean_count(radar)[mode], radar.count_model)
-    side = chirp.maximum_range(radar.slope, radar.max_intermediate_frequency)[mode]
-    capacity = radar.max_objects[mode]
-    footprints = place_objects(place_key, count, side, radar.classes, capacity)
-    resolution = chirp.range_resolution(radar.bandwidth)[mode]
-    detected = detection.detected_objects(footprints, resolution, radar.distance, radar.counting_rule)
-    return jnp.where(count <= capacity, detection.miss_ratio(count, detected), jnp.nan)
-
-
-def _fresh_of(key: Key, mode: Int, radar: Radar) -> Float:
-    """`fresh_miss_ratio` for a mode that is an array; a mode's number of slots is static, so each has its branch."""
-    modes = [functools.partial(fresh_miss_ratio, mode=m, radar=radar) for m in range(radar.num_modes)]
-    return jnp.where((mode >= 0) & (mode < radar.num_modes), jax.lax.switch(mode, modes, key), jnp.nan)
 
 
 def miss_ratio(
@@ -269,37 +229,15 @@ def miss_ratio(
     radar = dataclasses.replace(radar, density=jnp.asarray(density, jnp.float32), **indices)
     radar = dataclasses.replace(radar, max_objects=_capacities(radar, radar.max_objects))
     if is_traced(mode):
-        return _fresh_of(key, jnp.asarray(mode), radar)
+        return fresh_miss_ratio_of(key, jnp.asarray(mode), radar)
     return _jitted_fresh(key, int(mode), radar)
 
 
 _jitted_fresh = jax.jit(fresh_miss_ratio, static_argnums=1)
 
 
-def build_bank(radar: Radar, size: int) -> Float:
-    """Miss ratios of `size` independent placements per mode, [K, size]."""
-    bare = dataclasses.replace(radar, miss_bank=jnp.zeros((radar.num_modes, 0)), bank_inputs=jnp.zeros(0))
-    return _build_bank(bare, size)
-
-
 def _with_bank(radar: Radar, size: int) -> Radar:
     return dataclasses.replace(radar, miss_bank=build_bank(radar, size), bank_inputs=bank_inputs(radar))
-
-
-def bank_inputs(radar: Radar) -> Float:
-    """All numbers that a bank depends on, [n]."""
-    fields = [getattr(radar, name) for name in _BANK_FIELDS]
-    return jnp.concatenate([jnp.ravel(jnp.asarray(field)).astype(jnp.float32) for field in fields])
-
-
-@jax.jit(static_argnums=1)
-def _build_bank(radar: Radar, size: int) -> Float:
-    def of_mode(mode: int) -> Float:
-        mode_key = jax.random.fold_in(jax.random.key(radar.bank_seed), mode)
-        keys = jax.vmap(lambda i: jax.random.fold_in(mode_key, i))(jnp.arange(size))
-        return jax.lax.map(lambda key: fresh_miss_ratio(key, mode, radar), keys, batch_size=min(size, _CHUNK))
-
-    return jnp.stack([of_mode(mode) for mode in range(radar.num_modes)])
 
 
 def slot_miss_ratio(word: Words, mode: Int, radar: Radar) -> Float:
@@ -308,7 +246,7 @@ def slot_miss_ratio(word: Words, mode: Int, radar: Radar) -> Float:
     Drawn from the bank, or from a placement made afresh; both have the same distribution over slots.
     """
     if radar.placements == "fresh":
-        return _fresh_of(jax.random.key(word), mode, radar)
+        return fresh_miss_ratio_of(jax.random.key(word), mode, radar)
     bank = radar.miss_bank
     return bank[mode, rng.index(word, bank.shape[-1])]
 
@@ -350,7 +288,7 @@ def check_bank(radar: Radar) -> None:
     """Refuses a bank built for other parameters, as `dataclasses.replace` or a tree operation leaves it behind."""
     if is_traced(*jax.tree.leaves(radar)):
         return
-    wanted = np.concatenate([np.ravel(np.asarray(getattr(radar, name), np.float32)) for name in _BANK_FIELDS])
+    wanted = np.concatenate([np.ravel(np.asarray(getattr(radar, name), np.float32)) for name in BANK_FIELDS])
     if not np.array_equal(wanted, np.asarray(radar.bank_inputs)):
         refuse("radar.miss_bank", "built for other parameters", "the bank that `radar.replace(...)` builds")
 
