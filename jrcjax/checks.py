@@ -55,7 +55,7 @@ def require(
 def require_type(field: str, value: Any, wanted: type) -> None:
     """Refuses an object of another type."""
     if not isinstance(value, wanted):
-        refuse(field, f"object of type {type(value).__name__}", wanted.__name__)
+        raise ValueError(f"{field}: {type(value).__name__}; allowed: {wanted.__name__}")
 
 
 def as_array(field: str, value: Any, allowed: str) -> np.ndarray:

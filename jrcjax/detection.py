@@ -4,7 +4,7 @@ Two objects are unresolved when the gap between them is at most the range resolu
 measure is a gap between rectangles in a plane: the footprints themselves, points at their centres, or
 points on a line at their radial range. Sorted along one axis, an object can only be unresolved from
 its near neighbours in that order, so shifted copies of the sorted arrays are compared until no pair is
-near enough: for 1350 objects about 40 shifts instead of 1350.
+near enough: for 1350 objects about 30 shifts instead of 1350.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ import numpy as np
 import optax
 from flax import struct
 
-from jrcjax.checks import refuse, require
+from jrcjax.checks import refuse, require, require_type
 from jrcjax.types import Float, Int
 
 OPTIMISERS = ("adam", "sgd", "rmsprop")
@@ -97,8 +97,7 @@ def check_hparams(hparams: HParams) -> None:
     Raises:
       ValueError: naming the field, the value and what is allowed.
     """
-    if not isinstance(hparams, HParams):
-        raise ValueError(f"hparams: {type(hparams).__name__}; allowed: HParams")
+    require_type("hparams", hparams, HParams)
     unit = lambda x: (x >= 0) & (x <= 1)  # noqa: E731
     require("hparams.discount", hparams.discount, (), lambda x: (x >= 0) & (x < 1), "a number in [0, 1)")
     require("hparams.epsilon_start", hparams.epsilon_start, (), unit, "a probability in [0, 1]")
@@ -118,8 +117,7 @@ def check_config(config: Config) -> None:
     Raises:
       ValueError: naming the field, the value and what is allowed.
     """
-    if not isinstance(config, Config):
-        raise ValueError(f"config: {type(config).__name__}; allowed: Config")
+    require_type("config", config, Config)
     for name in ("episodes", "batch_size", "replay_capacity"):
         value = getattr(config, name)
         if not isinstance(value, int) or isinstance(value, bool) or not 1 <= value < 2**31:

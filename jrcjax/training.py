@@ -148,9 +148,13 @@ def train(
     """
     hparams, config = _checked(env_params, hparams, config)
     _check_keys(key, 0, "one key, as jax.random.key returns it; use vmap or train_agents for several")
-    rule = learner_for(learner, env_params, config)
-    agent = init_agent(key, hparams, rule)
-    return run_episodes(agent, 0, config.episodes, env_params, hparams, rule)
+    return _from_scratch(key, env_params, hparams, learner_for(learner, env_params, config), config.episodes)
+
+
+def _from_scratch(
+    key: Key, env_params: EnvParams, hparams: HParams, learner: Learner, episodes: int
+) -> tuple[AgentState, Log]:
+    return run_episodes(init_agent(key, hparams, learner), 0, episodes, env_params, hparams, learner)
 
 
 def train_agents(
@@ -190,7 +194,7 @@ def _many_agents(learner: str | LearnerFactory, spec: Spec, config: Config) -> C
 
     def one(shared, key):
         env_params, hparams = shared
-        return run_episodes(init_agent(key, hparams, rule), 0, config.episodes, env_params, hparams, rule)
+        return _from_scratch(key, env_params, hparams, rule, config.episodes)
 
     return over_agents(one)
 

@@ -48,6 +48,7 @@ def quoted(data: xr.Dataset) -> dict[str, str]:
         "reward per slot of the best constant action": constant,
         "its gap": 1 - constant / optimum,
         "states in which the optimum transmits": float(best[:, : params.num_rates].sum()),
+        "mean optimal value of a state at discount 0.99": float(exact.value_iteration(params).max(axis=1).mean()),
         "mean gap of DDQN, episodes 51 to 100": float(ddqn[:, 50:100].mean()),
         "mean gap of DDQN after episode 400": float(late.mean()),
         f"share of DDQN's snapshots after episode 400 with a gap above {TOLERANCE}": float((late > TOLERANCE).mean()),
