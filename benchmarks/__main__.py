@@ -10,7 +10,7 @@ from typing import Annotated
 
 import tyro
 
-NAMES = ("throughput",)
+NAMES = ("throughput", "sum_tree")
 
 
 @dataclass(frozen=True)
@@ -18,7 +18,7 @@ class Options:
     """Measures speed and memory on this machine."""
 
     names: Annotated[tuple[str, ...], tyro.conf.Positional] = ()
-    """Benchmarks to run: throughput. Default: all."""
+    """Benchmarks to run: throughput, sum_tree. Default: all."""
     json: Path | None = None
     """File for machine and results."""
     quick: bool = False
@@ -28,7 +28,7 @@ class Options:
 def main(args: list[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     options = tyro.cli(Options, prog="python -m benchmarks", args=args)
-    from benchmarks import throughput
+    from benchmarks import sum_tree, throughput
     from jrcjax.provenance import machine, versions
 
     unknown = [name for name in options.names if name not in NAMES]
@@ -38,7 +38,9 @@ def main(args: list[str] | None = None) -> int:
     if options.json is not None and not options.json.parent.is_dir():
         print(f"error: json: {str(options.json)!r}; allowed: a file in an existing folder", file=sys.stderr)
         return 2
-    results = throughput.run(options.quick)
+    chosen = options.names or NAMES
+    results = throughput.run(options.quick) if "throughput" in chosen else []
+    results += sum_tree.run(options.quick) if "sum_tree" in chosen else []
     if options.json is not None:
         content = {"machine": machine() | {"versions": versions()}, "results": results}
         options.json.write_text(json.dumps(content, indent=2) + "\n")

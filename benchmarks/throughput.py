@@ -12,6 +12,7 @@ timed over several repetitions; the median counts, the range shows the noise of 
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import multiprocessing
 import resource
@@ -87,24 +88,38 @@ def _environment(agents: int, steps: int, repetitions: int) -> Result:
 
 
 def _learner(name: str, agents: int, steps: int, repetitions: int) -> Result:
-    """A learner's whole training at the paper's sizes: acting, environment, replay, update, log."""
+    """A learner's whole training at the paper's sizes: acting, environment, replay, update, log.
+
+    TLwD is given demonstrations and goes without pre-training, so that a step is one of its online steps.
+    """
     import jax
 
     import jrcjax
     from jrcjax import parallel
 
     params = jrcjax.paper_params("source")
-    config = jrcjax.Config(episodes=max(steps // params.max_steps_in_episode, 1))
+    config = jrcjax.Config(episodes=max(steps // params.max_steps_in_episode, 1), pretraining=0)
     steps = config.episodes * params.max_steps_in_episode
-    run = parallel.over_agents(lambda params, key: jrcjax.train(key, params, learner=name, config=config)[1])
+    source = None
+    if name == "tlwd":
+        brief = dataclasses.replace(config, episodes=1)
+        source, _ = jrcjax.train_source(jax.random.key(0), params, jrcjax.HParams(), brief)
+
+    def one(shared, key):
+        params, source = shared
+        return jrcjax.train(key, params, learner=name, config=config, source=source)[1]
+
+    run = parallel.over_agents(one)
+    shared = (params, source)
     keys = lambda i: jax.random.split(jax.random.key(i), agents)  # noqa: E731
-    return _measure(name, agents, steps, repetitions, lambda: run.lower(params, keys(0)), lambda i: (params, keys(i)))
+    return _measure(name, agents, steps, repetitions, lambda: run.lower(shared, keys(0)), lambda i: (shared, keys(i)))
 
 
 CASES: dict[str, Callable[[int, int, int], Result]] = {
     "env": _environment,
     "q_learning": functools.partial(_learner, "q_learning"),
     "ddqn": functools.partial(_learner, "ddqn"),
+    "tlwd": functools.partial(_learner, "tlwd"),
 }
 
 
@@ -117,10 +132,10 @@ def _in_this_process(case: str, agents: int, steps: int, repetitions: int) -> Re
 
 def run(quick: bool) -> list[dict[str, Any]]:
     """Measures all cases, each in a fresh process, and prints a table."""
-    sizes = {"env": (1024, 1000), "q_learning": (64, 6_000), "ddqn": (64, 6_000)}
+    sizes = {"env": (1024, 1000), "q_learning": (64, 6_000), "ddqn": (64, 6_000), "tlwd": (64, 6_000)}
     if not quick:
-        sizes |= {"env": (1024, 10_000), "q_learning": (64, 300_000), "ddqn": (64, 300_000)}
-    repetitions = {"env": 5, "q_learning": 3, "ddqn": 3 if quick else 1}
+        sizes |= {"env": (1024, 10_000), "q_learning": (64, 300_000), "ddqn": (64, 300_000), "tlwd": (64, 300_000)}
+    repetitions = {"env": 5, "q_learning": 3, "ddqn": 3 if quick else 1, "tlwd": 3 if quick else 1}
     print(f"{'case':12s}{'agents':>6s}{'us/agent-step':>15s}  {'(range)':14s}{'compile s':>9s}{'peak MB':>9s}")
     results = []
     for case, (agents, steps) in sizes.items():

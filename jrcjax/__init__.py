@@ -6,14 +6,18 @@ with Joint Radar-Data Communications" (arXiv:2105.13670), called the paper throu
 
 from jrcjax import events, exact, radar
 from jrcjax.environment import EnvState, JRCEnv
+from jrcjax.episodes import AgentState, Log
 from jrcjax.hparams import Config, HParams
+from jrcjax.learners import Source
 from jrcjax.params import EnvParams, check_params
 from jrcjax.presets import paper_params
-from jrcjax.training import AgentState, Log, train, train_agents
+from jrcjax.source import train_source
+from jrcjax.training import train, train_agents
+from jrcjax.transfer import Transfer, transfer
 
 __version__ = "0.1.0"
 
 __all__ = [
-    "AgentState", "Config", "EnvParams", "EnvState", "HParams", "JRCEnv", "Log", "check_params", "events", "exact",
-    "paper_params", "radar", "train", "train_agents",
+    "AgentState", "Config", "EnvParams", "EnvState", "HParams", "JRCEnv", "Log", "Source", "Transfer", "check_params",
+    "events", "exact", "paper_params", "radar", "train", "train_agents", "train_source", "transfer",
 ]  # fmt: skip

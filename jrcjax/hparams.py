@@ -12,8 +12,8 @@ import numpy as np
 import optax
 from flax import struct
 
-from jrcjax.checks import refuse, require, require_type
-from jrcjax.types import Float, Int
+from jrcjax.checks import is_not_negative, refuse, require, require_reading, require_type
+from jrcjax.types import INITIAL_WEIGHTS, Float, Int
 
 OPTIMISERS = ("adam", "sgd", "rmsprop")
 FORMS = ("auto", "table", "rows")
@@ -44,6 +44,29 @@ class HParams:
     """Q-learning's step size is n(s, a)^-exponent; in (0.5, 1] it satisfies equation (14)."""
     step_constant: Float = _f32(0.0)
     """If positive, Q-learning's step size instead of the count-based one."""
+    priority_exponent: Float = _f32(0.4)
+    """alpha of equation (23); 0 samples uniformly."""
+    priority_constant: Float = _f32(0.001)
+    """epsilon, added to |TD error|."""
+    demonstration_constant: Float = _f32(1.0)
+    """The same for demonstrations."""
+    importance_start: Float = _f32(0.6)
+    """beta of equation (24) at first."""
+    importance_end: Float = _f32(1.0)
+    """beta in the last update; linear in between, over pre-training and training together."""
+    n_step_weight: Float = _f32(1.0)
+    """lambda_1 of equation (25)."""
+    margin_weight: Float = _f32(1.0)
+    """lambda_2."""
+    l2_weight: Float = _f32(1e-5)
+    """lambda_3."""
+    margin: Float = _f32(1.0)
+    """Gamma of equation (29) for actions other than the demonstrator's."""
+    demonstration_epsilon: Float = _f32(0.01)
+    """Probability of a random action while the source agent demonstrates."""
+    initial_weights: Int = struct.field(default_factory=lambda: jnp.int32(0))
+    """TLwD's at the start of pre-training, index into INITIAL_WEIGHTS: random, as in Algorithm 2, or the source
+    agent's."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +78,13 @@ class Config:
     batch_size: int = 64
     """N_b, samples per update."""
     replay_capacity: int = 50_000
-    """|D_re|, transitions that the replay memory holds."""
+    """|D_re|, transitions that the replay memory holds, TLwD's demonstrations among them."""
+    demonstrations: int = 20_000
+    """|D_S|, transitions of the source agent that TLwD is given."""
+    pretraining: int = 10_000
+    """T_pre, TLwD's updates on the demonstrations alone."""
+    n_step: int = 10
+    """n, rewards in an n-step return."""
     hidden: tuple[int, ...] = (24, 24)
     """Widths of the hidden layers."""
     optimiser: str | optax.GradientTransformation = "adam"
@@ -109,6 +138,13 @@ def check_hparams(hparams: HParams) -> None:
     exponent = lambda x: (x > 0.5) & (x <= 1)  # noqa: E731
     require("hparams.step_exponent", hparams.step_exponent, (), exponent, "a number in (0.5, 1], equation (14)")
     require("hparams.step_constant", hparams.step_constant, (), unit, "a number in [0, 1], 0 for count-based steps")
+    for name in ("priority_exponent", "importance_start", "importance_end", "demonstration_epsilon"):
+        require(f"hparams.{name}", getattr(hparams, name), (), unit, "a number in [0, 1]")
+    for name in ("priority_constant", "demonstration_constant"):
+        require(f"hparams.{name}", getattr(hparams, name), (), lambda x: x > 0, "a number > 0")
+    for name in ("n_step_weight", "margin_weight", "l2_weight", "margin"):
+        require(f"hparams.{name}", getattr(hparams, name), (), is_not_negative, "a number >= 0")
+    require_reading("hparams.initial_weights", hparams.initial_weights, INITIAL_WEIGHTS)
 
 
 def check_config(config: Config) -> None:
@@ -118,13 +154,13 @@ def check_config(config: Config) -> None:
       ValueError: naming the field, the value and what is allowed.
     """
     require_type("config", config, Config)
-    for name in ("episodes", "batch_size", "replay_capacity"):
-        value = getattr(config, name)
-        if not isinstance(value, int) or isinstance(value, bool) or not 1 <= value < 2**31:
+    for name in ("episodes", "batch_size", "replay_capacity", "demonstrations", "pretraining", "n_step"):
+        value, least = getattr(config, name), 0 if name == "pretraining" else 1
+        if not isinstance(value, int) or isinstance(value, bool) or not least <= value < 2**31:
             refuse(
                 f"config.{name}",
                 value if isinstance(value, int | float) else str(value),
-                "an integer from 1 to 2^31 - 1",
+                f"an integer from {least} to 2^31 - 1",
             )
     if not isinstance(config.hidden, tuple) or not all(isinstance(w, int) and w >= 1 for w in config.hidden):
         refuse("config.hidden", str(config.hidden), "a tuple of integers >= 1")

@@ -1,126 +1,24 @@
-"""Training one agent: nested scans over episodes and slots, written for one agent and vmapped over many.
-
-`train` is a pure function. `init_agent` and `run_episodes` are its two halves, for callers that advance agents in
-chunks and want to show progress or save in between. The agents are the same for every choice of chunks; the exact
-figures in the log may differ in the last bit, because XLA compiles a chunk of one episode differently.
-"""
+"""Training agents from scratch in one environment: one as a pure function, or many on all cores."""
 
 from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 
-from jrcjax import exploration, metrics, slot
 from jrcjax.checks import refuse
-from jrcjax.exact import evaluate_policy
+from jrcjax.episodes import AgentState, Log, init_agent, learner_for, run_episodes, spec_of
 from jrcjax.hparams import Config, HParams, check_config, check_hparams
-from jrcjax.learners import Learner, LearnerFactory, Spec, make_learner
+from jrcjax.learners import Learner, LearnerFactory, Source, Spec, make_learner
 from jrcjax.parallel import over_agents, pad_agents, padded
 from jrcjax.params import EnvParams, check_params
-from jrcjax.replay import Transition
-from jrcjax.types import Float, Int, Key, Words
+from jrcjax.presets import paper_params
+from jrcjax.source import check_source, train_source
+from jrcjax.types import Key
 
-_INIT, _EPISODES = 0, 1  # purposes of an agent's key
-
-
-class AgentState(NamedTuple):
-    """One agent between two episodes."""
-
-    key: Key
-    learner: Any
-    """The learner's state."""
-
-
-class Log(NamedTuple):
-    """Per episode, [episodes]; the last three are exact and belong to the policy without exploration."""
-
-    reward: Float
-    """Mean reward per slot."""
-    throughput: Float
-    """Packets in the episode, equation (6)."""
-    miss_detection: Float
-    """P_k, equation (7); NaN in an episode in which the convention counts no slot."""
-    policy_reward: Float
-    """Long-run reward per slot of the policy at the episode's end."""
-    policy_throughput: Float
-    """Its packets per slot."""
-    policy_miss_detection: Float
-    """Its miss detection."""
-
-
-def learner_for(learner: str | LearnerFactory, env_params: EnvParams, config: Config) -> Learner:
-    """The learner for an environment of these shapes."""
-    return make_learner(learner, Spec(env_params.shape, env_params.num_actions), config)
-
-
-def init_agent(key: Key, hparams: HParams, learner: Learner) -> AgentState:
-    """An agent before its first episode."""
-    return AgentState(key, learner.init(jax.random.fold_in(key, _INIT), hparams))
-
-
-def run_slot(
-    carry: tuple[Int, Any, metrics.Metrics],
-    words: Words,
-    number: Int,
-    last: jax.Array,
-    env_params: EnvParams,
-    hparams: HParams,
-    learner: Learner,
-) -> tuple[Int, Any, metrics.Metrics]:
-    """One slot of one agent: act, observe, learn, measure.
-
-    Args:
-      carry: state id, learner state, sums of the metrics.
-      words: random words of the slot: the environment's, the action's, the update's.
-      number: slots before this one, the same for all agents.
-      last: whether the slot is the episode's last.
-      env_params: the environment.
-      hparams: hyperparameters.
-      learner: the learning rule.
-    """
-    state, learner_state, sums = carry
-    of_slot, of_action, of_update = jnp.split(words, [slot.NUM_WORDS, slot.NUM_WORDS + exploration.NUM_WORDS])
-    action = learner.act(learner_state, state, number, of_action, hparams)
-    outcome = slot.run_slot(of_slot, state, action, env_params)
-    terminal = last & (env_params.terminal_time_limit == 1)
-    transition = Transition(state, action, outcome.reward, outcome.next_state, terminal.astype(jnp.int32))
-    learner_state = learner.update(learner_state, transition, number, of_update, hparams)
-    return outcome.next_state, learner_state, slot.measure(sums, outcome, env_params)
-
-
-def run_episode(
-    agent: AgentState, episode: Int, env_params: EnvParams, hparams: HParams, learner: Learner
-) -> tuple[AgentState, Log]:
-    """Episode number `episode` (from 0, the same for all agents): the agent after it, and its log (scalars)."""
-    slots = env_params.max_steps_in_episode
-    num_words = slot.NUM_WORDS + max(learner.num_words, exploration.NUM_WORDS)
-    key = jax.random.fold_in(jax.random.fold_in(agent.key, _EPISODES), episode)
-    words = jax.random.bits(key, (slots + 1, num_words), jnp.uint32)
-
-    def one_slot(carry, xs):
-        words, i = xs
-        return run_slot(carry, words, episode * slots + i, i == slots - 1, env_params, hparams, learner), None
-
-    start = (slot.initial_state(words[slots, : slot.NUM_WORDS], env_params), agent.learner, metrics.zero())
-    (_, learner_state, sums), _ = jax.lax.scan(one_slot, start, (words[:slots], jnp.arange(slots)))
-    exact = evaluate_policy(env_params, learner.policy(learner_state))
-    log = Log(metrics.average_reward(sums), metrics.throughput(sums), metrics.miss_detection(sums), *exact)
-    return AgentState(agent.key, learner_state), log
-
-
-def run_episodes(
-    agent: AgentState, first: Int | int, episodes: int, env_params: EnvParams, hparams: HParams, learner: Learner
-) -> tuple[AgentState, Log]:
-    """Episodes `first` to `first + episodes - 1`: the agent after them, and their log ([episodes] each)."""
-
-    def one_episode(agent, episode):
-        return run_episode(agent, episode, env_params, hparams, learner)
-
-    return jax.lax.scan(one_episode, agent, first + jnp.arange(episodes))
+_SOURCE = 2  # purpose of an agent's key, beside those in jrcjax.episodes
 
 
 def train(
@@ -130,15 +28,20 @@ def train(
     *,
     learner: str | LearnerFactory,
     config: Config | None = None,
+    source: Source | None = None,
 ) -> tuple[AgentState, Log]:
-    """Trains one agent from scratch: Algorithm 1 for "ddqn". Pure, and vmappable over all positional arguments.
+    """Trains one agent: Algorithm 1 for "ddqn", Algorithm 2 for "tlwd".
+
+    Pure, and vmappable over all positional arguments.
 
     Args:
-      key: the agent's PRNG key; it alone decides the agent's random numbers.
+      key: the agent's PRNG key; with `source` it alone decides the agent's random numbers.
       env_params: the environment.
       hparams: hyperparameters; Table I's if None.
-      learner: "round_robin", "q_learning", "ddqn", or a factory of your own.
+      learner: "round_robin", "q_learning", "ddqn", "dpr", "tlwd", or a factory of your own.
       config: static settings; Table I's if None.
+      source: what "dpr" and "tlwd" take over, from `train_source`. If None, they train an agent in the paper's source
+        environment first, which `jrcjax.transfer` does once for all learners.
 
     Returns:
       The agent after the last episode, and its log with one entry per episode.
@@ -146,15 +49,26 @@ def train(
     Raises:
       ValueError: naming the field, the value and what is allowed, before anything compiles.
     """
-    hparams, config = _checked(env_params, hparams, config)
-    _check_keys(key, 0, "one key, as jax.random.key returns it; use vmap or train_agents for several")
-    return _from_scratch(key, env_params, hparams, learner_for(learner, env_params, config), config.episodes)
+    hparams, config = filled_in(hparams, config)
+    check_training(env_params, hparams, config)
+    check_keys(key, 0, "one key, as jax.random.key returns it; use vmap or train_agents for several")
+    rule = learner_for(learner, env_params, config)
+    paper_source = _check_or_choose_source(source, rule, spec_of(env_params), config)
+    return _from_scratch(key, source, (env_params, hparams, paper_source), rule, config)
 
 
 def _from_scratch(
-    key: Key, env_params: EnvParams, hparams: HParams, learner: Learner, episodes: int
+    key: Key,
+    source: Source | None,
+    shared: tuple[EnvParams, HParams, EnvParams | None],
+    learner: Learner,
+    config: Config,
 ) -> tuple[AgentState, Log]:
-    return run_episodes(init_agent(key, hparams, learner), 0, episodes, env_params, hparams, learner)
+    env_params, hparams, paper_source = shared
+    if paper_source is not None:
+        source, _ = train_source(jax.random.fold_in(key, _SOURCE), paper_source, hparams, config)
+    agent = init_agent(key, hparams, learner, source)
+    return run_episodes(agent, 0, config.episodes, env_params, hparams, learner)
 
 
 def train_agents(
@@ -164,6 +78,7 @@ def train_agents(
     *,
     learner: str | LearnerFactory,
     config: Config | None = None,
+    source: Source | None = None,
 ) -> tuple[AgentState, Log]:
     """`train` for many keys in one environment, in blocks on all cores (see `jrcjax.parallel`).
 
@@ -173,6 +88,7 @@ def train_agents(
       hparams: hyperparameters, shared by all agents; Table I's if None.
       learner: as for `train`.
       config: static settings; Table I's if None.
+      source: as for `train`, one for each agent: every leaf has a leading axis of N.
 
     Returns:
       The agents and their logs, each leaf with a leading axis of N.
@@ -180,11 +96,17 @@ def train_agents(
     Raises:
       ValueError: naming the field, the value and what is allowed, before anything compiles.
     """
-    hparams, config = _checked(env_params, hparams, config)
-    _check_keys(keys, 1, "an array of at least one key, as jax.random.split returns it")
-    run = _many_agents(learner, Spec(env_params.shape, env_params.num_actions), config)
-    done = run((env_params, hparams), pad_agents(keys, padded(keys.shape[0])))
-    return jax.tree.map(lambda leaf: leaf[: keys.shape[0]], done)
+    hparams, config = filled_in(hparams, config)
+    check_training(env_params, hparams, config)
+    check_keys(keys, 1, "an array of at least one key, as jax.random.split returns it")
+    spec, agents = spec_of(env_params), keys.shape[0]
+    if source is not None and any(jnp.shape(leaf)[:1] != (agents,) for leaf in jax.tree.leaves(source)):
+        refuse("source", "other leading axes", f"one source for each of the {agents} keys along the first axis")
+    one_source = jax.tree.map(lambda leaf: leaf[0], source)
+    paper_source = _check_or_choose_source(one_source, make_learner(learner, spec, config), spec, config)
+    run = _many_agents(learner, spec, config)
+    done = run((env_params, hparams, paper_source), pad_agents((keys, source), padded(agents)))
+    return jax.tree.map(lambda leaf: leaf[:agents], done)
 
 
 @functools.cache
@@ -192,14 +114,27 @@ def _many_agents(learner: str | LearnerFactory, spec: Spec, config: Config) -> C
     """The same compiled function for the same learner, shapes and settings."""
     rule = make_learner(learner, spec, config)
 
-    def one(shared, key):
-        env_params, hparams = shared
-        return _from_scratch(key, env_params, hparams, rule, config.episodes)
+    def one(shared, agent):
+        key, source = agent
+        return _from_scratch(key, source, shared, rule, config)
 
     return over_agents(one)
 
 
-def _check_keys(keys: Key, dimensions: int, allowed: str) -> None:
+def _check_or_choose_source(source: Source | None, learner: Learner, spec: Spec, config: Config) -> EnvParams | None:
+    """Checks `source`; where the learner needs one and there is none, the environment to train it in."""
+    if source is not None:
+        check_source(source, spec, config)
+    if source is not None or not learner.needs_source:
+        return None
+    paper_source = paper_params("source")
+    if (paper_source.shape, paper_source.num_actions) != spec[:2]:
+        refuse("source", "None", "for an environment unlike the paper's a Source, as train_source returns it")
+    return paper_source
+
+
+def check_keys(keys: Key, dimensions: int, allowed: str) -> None:
+    """Raises ValueError unless `keys` is an array of PRNG keys with so many dimensions."""
     if not isinstance(keys, jax.Array):
         refuse("key", f"object of type {type(keys).__name__}", allowed)
     typed = jnp.issubdtype(keys.dtype, jax.dtypes.prng_key)
@@ -208,11 +143,13 @@ def _check_keys(keys: Key, dimensions: int, allowed: str) -> None:
         refuse("key", f"shape {keys.shape}", allowed)
 
 
-def _checked(env_params: EnvParams, hparams: HParams | None, config: Config | None) -> tuple[HParams, Config]:
-    """Fills in the defaults and checks everything."""
-    hparams = HParams() if hparams is None else hparams
-    config = Config() if config is None else config
+def filled_in(hparams: HParams | None, config: Config | None) -> tuple[HParams, Config]:
+    """Table I's hyperparameters and settings where there are none."""
+    return HParams() if hparams is None else hparams, Config() if config is None else config
+
+
+def check_training(env_params: EnvParams, hparams: HParams, config: Config) -> None:
+    """Raises ValueError naming the field, the value and what is allowed."""
     check_params(env_params)
     check_hparams(hparams)
     check_config(config)
-    return hparams, config

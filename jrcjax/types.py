@@ -29,6 +29,7 @@ DISTANCES = ("footprint_gap", "centre_to_centre", "radial_range")
 COUNTING_RULES = ("resolved", "clusters")
 COUNT_MODELS = ("fixed", "poisson")
 PLACEMENTS = ("bank", "fresh")
+INITIAL_WEIGHTS = ("random", "source")
 
 
 def choice(field: str, name: str, allowed: tuple[str, ...]) -> int:

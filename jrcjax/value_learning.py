@@ -5,6 +5,8 @@ Functions work on tables over all states, [S, A], or on rows of a batch, [B, A];
 
 from __future__ import annotations
 
+from typing import Any
+
 import chex
 import jax
 import jax.numpy as jnp
@@ -44,3 +46,22 @@ def robbins_monro_step(visits: Int, exponent: Float) -> Float:
 def greedy_policy(q: Float) -> Float:
     """Probabilities [..., S, A] of the policy that takes the largest value, the first of equals."""
     return jax.nn.one_hot(jnp.argmax(q, axis=-1), q.shape[-1])
+
+
+def large_margin_loss(q: Float, expert: Int, margin: Float) -> Float:
+    """max_a [Q(s, a) + Gamma(a_E, a)] - Q(s, a_E), equation (29), with Gamma the margin for a != a_E and 0 for a_E.
+
+    Args:
+      q: [B, A] values of the demonstrated states.
+      expert: [B] the demonstrator's actions a_E.
+      margin: a scalar.
+    """
+    chex.assert_rank([q, expert], [2, 1])
+    is_expert = jax.nn.one_hot(expert, q.shape[-1], dtype=bool)
+    best = jnp.max(q + jnp.where(is_expert, 0.0, margin), axis=-1)
+    return best - jnp.where(is_expert, q, 0.0).sum(axis=-1)
+
+
+def l2_loss(weights: Any) -> Float:
+    """J_L2, the sum of the squares of all weights and biases."""
+    return sum((jnp.sum(jnp.square(leaf)) for leaf in jax.tree.leaves(weights)), jnp.float32(0.0))

@@ -45,8 +45,9 @@ def make_figures(numbers: tuple[int, ...], size: Size, out: Path, console: Conso
     from paper_figs import claims, report, style
     from paper_figs.figures import FIGURES, NUMBERS
     from sweeps import store
+    from sweeps.estimate import in_words
     from sweeps.registry import SWEEPS
-    from sweeps.run import run_sweep
+    from sweeps.run import expected_seconds, run_sweep
 
     unknown = sorted(set(numbers) - set(NUMBERS))
     if unknown:
@@ -54,9 +55,14 @@ def make_figures(numbers: tuple[int, ...], size: Size, out: Path, console: Conso
     size.check()
     out.mkdir(parents=True, exist_ok=True)
     wanted = [figure for figure in FIGURES if not numbers or figure.number in numbers]
+    results = results_folder(out, size)
+    seconds = expected_seconds([SWEEPS[figure.name] for figure in wanted], size, results)
+    console.print(
+        f"{len(wanted)} figures, {size.seeds} seeds, {size.episodes} episodes: about {in_words(seconds)} in all"
+    )
     written, pictures, judgements, optima, manifests = [], {}, [], [], {}
     for figure in wanted:
-        folder = run_sweep(SWEEPS[figure.sweep], size, results_folder(out, size), console, resume=True)
+        folder = run_sweep(SWEEPS[figure.name], size, results, console, resume=True)
         data = store.load(folder, size.seeds)
         table = figure.table(data)
         table.to_csv(out / f"{figure.name}.csv", index=False, float_format="%.6g")
@@ -64,8 +70,8 @@ def make_figures(numbers: tuple[int, ...], size: Size, out: Path, console: Conso
         written += [out / f"{figure.name}.csv", *files]
         pictures[figure.title] = files[-1]
         judgements += figure.claims(data)
-        optima += report.optimum_rows(figure.sweep, data)
-        manifests[figure.sweep] = (folder / store.MANIFEST).read_text()
+        optima += report.optimum_rows(figure.name, data)
+        manifests[figure.name] = (folder / store.MANIFEST).read_text()
     page = report.render(size, pictures, judgements, optima, manifests)
     texts = {"claims.json": json.dumps(claims.as_json(judgements), indent=2) + "\n", "report.html": page}
     for name, text in texts.items():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -9,7 +10,8 @@ import pandas as pd
 import xarray as xr
 from matplotlib.figure import Figure
 
-from paper_figs import claims, curves
+from paper_figs import curves, learning_claims, points, sweep_claims
+from paper_figs.claims import Judgement
 
 
 @dataclass(frozen=True)
@@ -17,17 +19,15 @@ class PaperFigure:
     """One picture."""
 
     name: str
-    """File name without suffix."""
+    """File name without suffix, and name of the sweep with its results."""
     number: int
     """Number in the paper, as `--only` takes it."""
     title: str
-    sweep: str
-    """Name of the sweep with its results."""
     table: Callable[[xr.Dataset], pd.DataFrame]
     """Results to plotted numbers."""
     draw: Callable[[pd.DataFrame, str], Figure]
     """Plotted numbers and title to picture."""
-    claims: Callable[[xr.Dataset], list[claims.Judgement]]
+    claims: Callable[[xr.Dataset], list[Judgement]]
     """Results to verdicts."""
 
 
@@ -36,10 +36,49 @@ FIGURES = (
         name="fig5a",
         number=5,
         title="Fig. 5(a): source environment",
-        sweep="fig5a",
         table=lambda data: curves.table(data, figure="5", panel="a"),
         draw=curves.draw,
-        claims=claims.source_claims,
+        claims=learning_claims.source_claims,
+    ),
+    PaperFigure(
+        name="fig5b",
+        number=5,
+        title="Fig. 5(b): target environment",
+        table=lambda data: curves.table(data, figure="5", panel="b"),
+        draw=curves.draw,
+        claims=learning_claims.target_claims,
+    ),
+    PaperFigure(
+        name="fig6",
+        number=6,
+        title="Fig. 6: event probability at high speed",
+        table=lambda data: points.table(data, "6", "high_speed_event_probability"),
+        draw=functools.partial(points.draw, x_label="$p_1^v$"),
+        claims=sweep_claims.speed_claims,
+    ),
+    PaperFigure(
+        name="fig7",
+        number=7,
+        title="Fig. 7: probability of favourable conditions",
+        table=lambda data: points.table(data, "7", "favourable_probability"),
+        draw=functools.partial(points.draw, x_label=r"$\tau_0$ of all factors"),
+        claims=sweep_claims.favourable_claims,
+    ),
+    PaperFigure(
+        name="fig8",
+        number=8,
+        title="Fig. 8: traffic density",
+        table=lambda data: points.table(data, "8", "density"),
+        draw=functools.partial(points.draw, x_label=r"$\omega$ (objects per 45 m $\times$ 45 m)"),
+        claims=sweep_claims.density_claims,
+    ),
+    PaperFigure(
+        name="fig9",
+        number=9,
+        title="Fig. 9: TLwD in the target",
+        table=lambda data: curves.table(data, figure="9", panel="", points={"tlwd": 0, "tlwd_uniform": 1}),
+        draw=curves.draw,
+        claims=learning_claims.replay_claims,
     ),
 )
 NUMBERS = tuple(sorted({figure.number for figure in FIGURES}))

@@ -1,4 +1,4 @@
-"""The numbers that the README quotes, from the folder that `make figures` wrote.
+"""The tables and numbers that the README quotes, from the folder that `make figures` wrote.
 
 Run as `python -m paper_figs.readme [OUT]`.
 """
@@ -17,24 +17,29 @@ from jrcjax import exact
 from jrcjax.hparams import HParams
 from jrcjax.presets import paper_params
 from paper_figs.__main__ import results_folder
-from paper_figs.claims import TOLERANCE, gaps, source_claims
+from paper_figs.claims import TOLERANCE, convergence_episode, first, gaps
+from paper_figs.figures import FIGURES
+from paper_figs.learning_claims import source_claims
 from sweeps import store
+from sweeps.ablation import VARIANTS
 from sweeps.sweep import Size
 
 
-def claims_table(claims: list[dict]) -> str:
-    """Verdicts as a Markdown table."""
-    head = ("claim", "the paper's statement", "holds if", "measured (95 % interval)", "seeds", "verdict")
+def claims_table(claims: list[dict], figure: str) -> str:
+    """Verdicts that rest on one figure, "5a" or "6" with all its panels, as a Markdown table."""
+    head = ("claim", "the paper's statement", "holds if", "measured (95 % interval)", "verdict")
     rows = [head, ("---",) * len(head)]
     for c in claims:
+        if not c["figure"].startswith(figure):
+            continue
         criterion = f"{c['effect']} {c['relation']} {c['limit']:g}"
-        measured = f"{c['value']:.3f} ({c['ci_low']:.3f} to {c['ci_high']:.3f})"
-        rows.append((c["claim"], c["statement"], criterion, measured, str(c["n_seeds"]), c["verdict"]))
+        measured = f"{c['value']:.3g} ({c['ci_low']:.3g} to {c['ci_high']:.3g})"
+        rows.append((c["claim"], c["statement"], criterion, measured, c["verdict"]))
     return "\n".join("| " + " | ".join(row) + " |" for row in rows)
 
 
-def quoted(data: xr.Dataset) -> dict[str, str]:
-    """The single numbers in the text."""
+def quoted_of_source(data: xr.Dataset) -> dict[str, str]:
+    """The single numbers in the text about Fig. 5(a)."""
     params = paper_params("source")
     best = exact.optimal_policy(params)
     epsilon = float(HParams().epsilon_end)
@@ -65,19 +70,55 @@ def quoted(data: xr.Dataset) -> dict[str, str]:
     return words
 
 
+def quoted_of_target(data: xr.Dataset) -> dict[str, str]:
+    """The single numbers in the text about Fig. 5(b)."""
+    optimum, constant = (float(data[f"{name}_reward"].isel(point=0)) for name in ("optimum", "constant"))
+    numbers = {"optimal reward per slot": optimum, "gap of the best constant action": 1 - constant / optimum}
+    for name in ("tlwd", "dpr", "ddqn", "q_learning"):
+        gap = gaps(data, name)
+        numbers |= {
+            f"mean gap of {name} after its first episode": float(gap[:, 0].mean()),
+            f"mean gap of {name}, episodes 51 to 100": float(gap[:, 50:100].mean()),
+            f"mean gap of {name} after episode 400": float(gap[:, 400:].mean()),
+            f"packets per episode of {name}": float(first(data, "throughput", name).mean()),
+            f"miss detection of {name}": float(first(data, "miss_detection", name).mean()),
+        }
+    words = {name: f"{value:.3g}" for name, value in numbers.items()}
+    for name in ("tlwd", "dpr", "ddqn"):
+        words[f"convergence episodes of {name}"] = ", ".join(
+            f"{e:.0f}" for e in sorted(convergence_episode(data, name))
+        )
+    return words
+
+
+def quoted_of_ablation(data: xr.Dataset) -> dict[str, str]:
+    """What TLwD reaches with parts left out."""
+    return {
+        name: f"mean gap after its first episode {gaps(data, 'tlwd', point)[:, 0].mean():.3g}, "
+        f"after episode 400 {gaps(data, 'tlwd', point)[:, 400:].mean():.3g}"
+        for point, name in enumerate(VARIANTS)
+    }
+
+
 def main() -> int:
-    """Prints the table and the numbers; returns the exit status."""
+    """Prints the tables and the numbers; returns the exit status."""
     out = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
     try:
         claims = json.loads((out / "claims.json").read_text())
-        folder = results_folder(out, Size()) / "fig5a"
-        numbers = quoted(store.load(folder, claims[0]["n_seeds"]))
+        folder = results_folder(out, Size())
+        source, target = (store.load(folder / name, claims[0]["n_seeds"]) for name in ("fig5a", "fig5b"))
     except OSError as error:
         print(f"error: {error}; run `make figures` first", file=sys.stderr)
         return 2
-    print(claims_table(claims))
-    for name, value in numbers.items():
-        print(f"{name}: {value}")
+    for figure in FIGURES:
+        print(f"\n{figure.title}\n\n{claims_table(claims, figure.name.removeprefix('fig'))}")
+    sections = {"in the source": quoted_of_source(source), "in the target": quoted_of_target(target)}
+    if (folder / "ablation").exists():
+        sections["TLwD with parts left out"] = quoted_of_ablation(store.load(folder / "ablation", Size().seeds))
+    for title, numbers in sections.items():
+        print(f"\n{title}")
+        for name, value in numbers.items():
+            print(f"{name}: {value}")
     return 0
 
 

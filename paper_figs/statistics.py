@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from scipy import stats
+
+_RESAMPLES = 10_000
 
 
 class Mean(NamedTuple):
@@ -31,6 +34,26 @@ def mean_over_seeds(values: np.ndarray, confidence: float = 0.95) -> Mean:
         return Mean(mean, unknown, unknown, n)
     half = stats.t.ppf((1 + confidence) / 2, n - 1) * values.std(axis=0, ddof=1) / np.sqrt(n)
     return Mean(mean, mean - half, mean + half, n)
+
+
+def bootstrap(
+    values: np.ndarray, statistic: Callable[[np.ndarray], np.ndarray], seed: int = 0
+) -> tuple[float, float, float]:
+    """A statistic of means over seeds and its 95 % percentile bootstrap interval; the interval is NaN for one seed.
+
+    Args:
+      values: [seeds, ...].
+      statistic: function of means [..., n], where the last axis counts resamples, to [n].
+      seed: of the generator.
+    """
+    values = np.asarray(values, float)
+    value = float(statistic(values.mean(axis=0)[..., None])[0])
+    if len(values) < 2:
+        return value, float("nan"), float("nan")
+    draws = np.random.default_rng(seed).integers(len(values), size=(_RESAMPLES, len(values)))
+    weights = np.stack([(draws == i).mean(axis=1) for i in range(len(values))])  # [seeds, resamples]
+    low, high = np.quantile(statistic(np.tensordot(values, weights, axes=(0, 0))), [0.025, 0.975])
+    return value, float(low), float(high)
 
 
 def bins_of(episodes: int, points: int = 100) -> int:

@@ -8,28 +8,62 @@ from pathlib import Path
 from typing import NamedTuple, ParamSpec
 
 import matplotlib as mpl
+import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 P = ParamSpec("P")
 STYLE = Path(__file__).with_name("ieee.mplstyle")
+TWO_COLUMNS = (7.16, 2.55)
+"""Inches of a figure across both columns."""
 
 
 class Look(NamedTuple):
-    """How an algorithm appears in every figure."""
+    """How a line appears in every figure."""
 
     label: str
     color: str
-    marker: str
+    marker: str = ""
+    line: str = "-"
 
 
 # Okabe and Ito's palette, which stays apart for the colour-blind and in grey.
 LOOKS = {
     "tlwd": Look("TLwD", "#D55E00", "o"),
+    "tlwd_uniform": Look("TLwD, uniform replay", "#000000", "x"),
     "dpr": Look("DPR", "#009E73", "s"),
     "ddqn": Look("DDQN", "#0072B2", "^"),
     "q_learning": Look("Q-learning", "#CC79A7", "D"),
     "round_robin": Look("Round Robin", "#56B4E9", "v"),
 }
+EXACT = {
+    "optimum": Look("optimum (exact)", "black", line="--"),
+    "explored": Look("optimum, exploring (exact)", "0.35", line="-."),
+    "constant": Look("best constant (exact)", "0.5", line=":"),
+}
+"""What is computed and not simulated."""
+
+
+def plot(axes: Axes, curve: pd.DataFrame, look: Look, markers: int) -> None:
+    """One line of a table with its band and about so many markers."""
+    every = max(len(curve) // markers, 1)
+    axes.plot(
+        curve.x,
+        curve["mean"],
+        color=look.color,
+        linestyle=look.line,
+        marker=look.marker,
+        markevery=every,
+        label=look.label,
+    )
+    if curve.n_seeds.max() > 0:
+        axes.fill_between(curve.x, curve.ci_low, curve.ci_high, color=look.color, alpha=0.25, linewidth=0)
+
+
+def band_of(numbers: pd.DataFrame) -> str:
+    """What a figure's title says of its seeds and bands."""
+    seeds = int(numbers.n_seeds.max())
+    return f"{seeds} seeds, bands: 95 % interval of the mean" if seeds > 1 else "one seed, no interval"
 
 
 def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:

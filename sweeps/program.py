@@ -5,20 +5,23 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jrcjax import exact, parallel
-from jrcjax.hparams import Config, HParams
-from jrcjax.learners import Spec, make_learner
+from jrcjax.episodes import AgentState, Log, init_agent, run_episodes, spec_of
+from jrcjax.hparams import Config, HParams, check_hparams
+from jrcjax.learners import Source, Spec, make_learner
 from jrcjax.params import EnvParams, check_params
-from jrcjax.training import Log, init_agent, run_episodes
+from jrcjax.schedules import epsilon
+from jrcjax.transfer import target_key
+from jrcjax.types import Key
 from sweeps.sweep import Size, Sweep
 
-_CHUNK = 50  # most episodes between two reports of progress: a few seconds
+_CHUNK = 20  # most episodes between two reports of progress: a few seconds
 
 
 class Progress(NamedTuple):
@@ -28,6 +31,15 @@ class Progress(NamedTuple):
     """Episodes in the chunk."""
     log: dict[str, Log]
     """By learner: [points, seeds, episodes] each."""
+    agents: dict[str, AgentState]
+    """By learner, after the chunk; the leading axis of every leaf is lanes, of which the first points x seeds count."""
+
+
+class Points(NamedTuple):
+    """What differs between points, every leaf with a leading axis of points."""
+
+    params: EnvParams
+    hparams: HParams
 
 
 def chunk_of(episodes: int) -> int:
@@ -35,28 +47,40 @@ def chunk_of(episodes: int) -> int:
     return max(d for d in range(1, min(episodes, _CHUNK) + 1) if episodes % d == 0)
 
 
-def points_of(sweep: Sweep, preset: str) -> EnvParams:
-    """The environments of all points, checked and stacked along a leading axis."""
-    points = [sweep.params_at(x, preset) for x in sweep.x_values]
-    for params in points:
-        check_params(params)
+def points_of(sweep: Sweep, preset: str) -> Points:
+    """The environments and hyperparameters of all points, checked and stacked along a leading axis."""
+    points = [Points(sweep.params_at(x, preset), sweep.hparams_at(x)) for x in sweep.x_values]
+    for point in points:
+        check_params(point.params)
+        check_hparams(point.hparams)
     return jax.tree.map(lambda *leaves: jnp.stack(leaves), *points)
 
 
 class Reference(NamedTuple):
-    """Exact long-run figures at each point, [points] each."""
+    """Exact long-run figures at each point."""
 
     optimum: exact.LongRun
+    """[points]."""
     constant: exact.LongRun
-    """Of the best policy that ignores the state."""
+    """Of the best policy that ignores the state, [points]."""
+    explored: exact.LongRun
+    """Of the optimal policy with the learners' random actions, [points, episodes]: the most that a learner can earn."""
 
 
-def reference_of(points: EnvParams) -> Reference:
+def reference_of(points: Points, episodes: int) -> Reference:
     """What learners are held against at each point."""
+    slots = points.params.max_steps_in_episode
 
-    def at(params: EnvParams) -> Reference:
-        policies = (exact.optimal_policy(params), exact.best_constant_action(params))
-        return Reference(*(exact.evaluate_policy(params, policy) for policy in policies))
+    def at(point: Points) -> Reference:
+        params, hparams = point
+        best = exact.optimal_policy(params)
+
+        def explored(episode):
+            random = epsilon(episode * slots + jnp.arange(slots), hparams).mean()
+            return exact.evaluate_policy(params, (1 - random) * best + random / params.num_actions)
+
+        optimum, constant = (exact.evaluate_policy(params, p) for p in (best, exact.best_constant_action(params)))
+        return Reference(optimum, constant, jax.vmap(explored)(jnp.arange(episodes)))
 
     return jax.jit(jax.vmap(at))(points)
 
@@ -65,46 +89,68 @@ class Program(NamedTuple):
     """A sweep's compiled functions over lanes; a lane is one seed at one point."""
 
     start: Callable
-    """((), keys) to the agents of all learners before their first episode."""
+    """(points, (keys, sources, points' numbers)) to the agents of all learners before their first episode."""
     advance: Callable
     """((points, number of the first episode), (agents, points' numbers)) to the agents a chunk later, and their log."""
 
 
 @functools.cache
-def program_of(sweep: Sweep, spec: Spec, episodes: int, chunk: int) -> Program:
-    """The program of a sweep for environments of one shape; the same object for all blocks, so it compiles once."""
-    hparams, config = HParams(), Config(episodes=episodes)
-    rules = {name: make_learner(name, spec, config) for name in sweep.learners}
+def program_of(learners: tuple[str, ...], spec: Spec, config: Config, chunk: int) -> Program:
+    """The program of these learners in environments of one shape.
 
-    def start(_, key):
-        return {name: init_agent(key, hparams, rule) for name, rule in rules.items()}
+    It is the same object for all blocks, and for all sweeps with these learners, so it compiles once for a shape.
+    """
+    rules = {name: make_learner(name, spec, config) for name in learners}
+
+    def at(points: Points, point) -> Points:
+        # A single point is shared by all lanes, and its bank of placements with it.
+        return jax.tree.map(lambda a: a[0] if a.shape[0] == 1 else a[point], points)
+
+    def start(points, lane):
+        key, source, point = lane
+        return {name: init_agent(key, at(points, point).hparams, rule, source) for name, rule in rules.items()}
 
     def advance(shared, lane):
         points, first = shared
         agents, point = lane
-        # A single point is shared by all lanes, and its bank of placements with it.
-        params = jax.tree.map(lambda a: a[0] if a.shape[0] == 1 else a[point], points)
+        params, hparams = at(points, point)
         done = {n: run_episodes(agents[n], first, chunk, params, hparams, rule) for n, rule in rules.items()}
         return {n: agent for n, (agent, _) in done.items()}, {n: log for n, (_, log) in done.items()}
 
     return Program(parallel.over_agents(start), parallel.over_agents(advance))
 
 
-def run_block(sweep: Sweep, size: Size, points: EnvParams, seeds: range) -> Iterator[Progress]:
+def keys_of(seeds: np.ndarray) -> Key:
+    """Keys of seeds [N]: seed i has `fold_in(key(0), i)`, whatever other seeds there are."""
+    return jax.vmap(lambda i: jax.random.fold_in(jax.random.key(0), i))(jnp.asarray(seeds))
+
+
+def run_block(sweep: Sweep, size: Size, points: Points, seeds: range, source: Source | None) -> Iterator[Progress]:
     """Runs some seeds of a sweep at all of its points, one chunk of episodes after the other.
 
-    Seed i has the key `fold_in(key(0), i)` at every point and for every learner, in whatever block it runs.
+    A seed has the same key at every point and for every learner, in whatever block it runs: that of `keys_of`, or its
+    `target_key` in a sweep that transfers, since the seed's source agent has the other.
+
+    Args:
+      sweep: what to run.
+      size: how much of it.
+      points: its points.
+      seeds: the seeds.
+      source: of the seeds, if the sweep transfers; every leaf has a leading axis of seeds.
     """
     chunk = chunk_of(size.episodes)
-    first_point = jax.tree.map(lambda a: a[0], points)
-    program = program_of(sweep, Spec(first_point.shape, first_point.num_actions), size.episodes, chunk)
+    spec = spec_of(jax.tree.map(lambda a: a[0], points.params))
+    program = program_of(sweep.learners, spec, size.config, chunk)
     shape = (len(sweep.x_values), len(seeds))
-    point, seed = (a.reshape(-1) for a in np.meshgrid(np.arange(shape[0]), np.array(seeds), indexing="ij"))
+    point, seed = (a.reshape(-1) for a in np.indices(shape))
     lanes = parallel.padded(point.size)
-    keys = jax.vmap(lambda i: jax.random.fold_in(jax.random.key(0), i))(jnp.asarray(seed))
-    agents = program.start((), parallel.pad_agents(keys, lanes))
+    keys = keys_of(np.array(seeds)[seed])
+    if sweep.transfers:
+        keys = jax.vmap(target_key)(keys)
+    of_lane: Any = jax.tree.map(lambda leaf: leaf[seed], source)
     where = parallel.pad_agents(jnp.asarray(point), lanes)
+    agents = program.start(points, (*parallel.pad_agents((keys, of_lane), lanes), where))
     for first in range(0, size.episodes, chunk):
         agents, log = program.advance((points, jnp.int32(first)), (agents, where))
         unpadded = jax.tree.map(lambda a: np.asarray(a[: math.prod(shape)]).reshape(*shape, chunk), log)
-        yield Progress(chunk, unpadded)
+        yield Progress(chunk, unpadded, agents)

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+from sweeps.ablation import ABLATION
 from sweeps.fig5a import FIG5A
+from sweeps.fig5b import FIG5B
+from sweeps.fig6 import FIG6
+from sweeps.fig7 import FIG7
+from sweeps.fig8 import FIG8
+from sweeps.fig9 import FIG9
 from sweeps.sweep import Sweep
 
-SWEEPS: dict[str, Sweep] = {sweep.name: sweep for sweep in (FIG5A,)}
+SWEEPS: dict[str, Sweep] = {sweep.name: sweep for sweep in (FIG5A, FIG5B, FIG6, FIG7, FIG8, FIG9, ABLATION)}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import jax
@@ -10,13 +10,22 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from jrcjax.training import Log
-from sweeps import store
-from sweeps.program import points_of, reference_of, run_block
+from jrcjax.episodes import Log
+from jrcjax.provenance import usable_cores
+from sweeps import estimate, store
+from sweeps.program import Points, Reference, points_of, reference_of, run_block
+from sweeps.sources import SOURCE, missing_sources, sources_of
 from sweeps.sweep import Size, Sweep
 
 SEEDS_PER_PART = 16
 """Seeds that share a part file."""
+_COLUMNS = (
+    TextColumn("{task.description}"),
+    BarColumn(),
+    TaskProgressColumn(),
+    TimeElapsedColumn(),
+    TimeRemainingColumn(),
+)
 
 
 def blocks(wanted: int, finished: set[int]) -> Iterator[range]:
@@ -33,14 +42,34 @@ def blocks(wanted: int, finished: set[int]) -> Iterator[range]:
         seed = stop
 
 
+def to_do(sweep: Sweep, size: Size, out: Path) -> list[range]:
+    """The blocks of a sweep that are still to be run.
+
+    Raises:
+      ConfigurationMismatch: if there are results of another configuration.
+    """
+    folder = out / sweep.name
+    store.check_folder(folder, sweep, size)
+    return list(blocks(size.seeds, store.finished_seeds(folder)))
+
+
+def expected_seconds(sweeps: list[Sweep], size: Size, out: Path) -> float:
+    """What these sweeps will take, with the source agents that they lack, as far as one can tell beforehand."""
+    todo = {sweep: to_do(sweep, size, out) for sweep in sweeps}
+    transfers = {seeds for sweep in sweeps if sweep.transfers for seeds in todo[sweep]}
+    lacking = {missing_sources(size, seeds, out) for seeds in transfers}
+    agents = sum(estimate.block_seconds(SOURCE, size, len(seeds)) for seeds in lacking if seeds)
+    return agents + sum(estimate.block_seconds(sweep, size, len(seeds)) for sweep in sweeps for seeds in todo[sweep])
+
+
 def run_sweep(sweep: Sweep, size: Size, out: Path, console: Console, *, resume: bool) -> Path:
     """Runs what is missing of a sweep.
 
     Args:
       sweep: what to run.
       size: how much of it.
-      out: results go to `out / sweep.name`.
-      console: where progress is shown.
+      out: results go to `out / sweep.name`, source agents to `out / "source"`.
+      console: where the expected time and the progress are shown.
       resume: continue in a folder that holds results of the same configuration.
 
     Returns:
@@ -51,35 +80,51 @@ def run_sweep(sweep: Sweep, size: Size, out: Path, console: Console, *, resume: 
     """
     size.check()
     folder = out / sweep.name
-    store.check_folder(folder, sweep, size)
-    finished = store.finished_seeds(folder) if folder.exists() else set()
+    todo = to_do(sweep, size, out)
+    finished = size.seeds - sum(map(len, todo))
     if finished and not resume:
-        raise ValueError(
-            f"{folder} holds results of {len(finished)} seeds already; add --resume, or choose another --out"
-        )
-    todo = list(blocks(size.seeds, finished))
+        raise ValueError(f"{folder} holds results of {finished} seeds already; add --resume, or choose another --out")
     if not todo:
         console.print(f"{sweep.name}: all {size.seeds} seeds are there, in {folder}")
         return folder
+    seconds = expected_seconds([sweep], size, out)
+    console.print(_announcement(sweep, size, todo, seconds))
     folder.mkdir(parents=True, exist_ok=True)
     points = points_of(sweep, size.preset)
-    reference = reference_of(points)
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=console) as progress:
-        total = sum(len(seeds) for seeds in todo) * size.episodes
-        task = progress.add_task(f"{sweep.name}: {size.seeds} seeds x {size.episodes} episodes", total=total)
+    reference = reference_of(points, size.episodes)
+    with Progress(*_COLUMNS, console=console) as progress:
+        task = progress.add_task(sweep.name, total=seconds)
         for seeds in todo:
-            logs: list[dict[str, Log]] = []
-            for chunk in run_block(sweep, size, points, seeds):
-                logs.append(chunk.log)
-                progress.advance(task, chunk.episodes * len(seeds))
-            whole = jax.tree.map(lambda *parts: np.concatenate(parts, axis=-1), *logs)
-            store.write_part(folder, seeds, store.dataset(sweep, size, seeds, whole, reference))
-            store.write_manifest(folder, sweep, size)
+            _run_block(sweep, size, points, reference, seeds, out, lambda done: progress.advance(task, done))
     return folder
+
+
+def _announcement(sweep: Sweep, size: Size, todo: list[range], seconds: float) -> str:
+    agents = len(sweep.x_values) * sum(map(len, todo)) * len(sweep.learners)
+    return (
+        f"{sweep.name}: {agents} agents (points x seeds x learners), {size.episodes} episodes each; expected "
+        f"{estimate.in_words(seconds)} with {usable_cores()} cores, and half a minute of compiling"
+    )
+
+
+def _run_block(
+    sweep: Sweep,
+    size: Size,
+    points: Points,
+    reference: Reference,
+    seeds: range,
+    out: Path,
+    advance: Callable[[float], None],
+) -> None:
+    """Runs one block of seeds and writes its part; `advance` is told how many of the expected seconds are done."""
+    source = sources_of(size, seeds, out, advance) if sweep.transfers else None
+    logs: list[dict[str, Log]] = []
+    for chunk in run_block(sweep, size, points, seeds, source):
+        if not logs:
+            advance(estimate.pretraining_seconds(sweep, size, len(seeds)))
+        logs.append(chunk.log)
+        advance(chunk.episodes * estimate.seconds_per_episode(sweep, len(seeds)))
+    whole = jax.tree.map(lambda *parts: np.concatenate(parts, axis=-1), *logs)
+    folder = out / sweep.name
+    store.write_part(folder, seeds, store.dataset(sweep, size, seeds, whole, reference))
+    store.write_manifest(folder, sweep, size)

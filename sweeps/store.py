@@ -19,11 +19,12 @@ import jax
 import numpy as np
 import xarray as xr
 
+from jrcjax.episodes import Log
 from jrcjax.exact import LongRun
-from jrcjax.hparams import Config, HParams
+from jrcjax.hparams import HParams
 from jrcjax.params import EnvParams
+from jrcjax.presets import paper_params
 from jrcjax.provenance import provenance
-from jrcjax.training import Log
 from sweeps.program import Reference, points_of
 from sweeps.sweep import Size, Sweep
 
@@ -43,23 +44,26 @@ def digest_of(points: EnvParams) -> str:
 
 def configuration(sweep: Sweep, size: Size) -> dict[str, Any]:
     """What must agree for two parts to be of one result. The number of seeds is not part of it."""
-    # Through text, so that a float32 appears as the number that was meant.
-    hparams = {name: float(str(np.asarray(value))) for name, value in vars(HParams()).items()}
-    config = {name: value for name, value in asdict(Config(episodes=size.episodes)).items() if name != "episodes"}
-    return json.loads(
-        json.dumps(
-            {
-                "sweep": sweep.name,
-                "preset": size.preset,
-                "episodes": size.episodes,
-                "learners": sweep.learners,
-                "x": {sweep.x_name: sweep.x_values},
-                "environments": digest_of(points_of(sweep, size.preset)),
-                "hparams": hparams,
-                "config": config,
-            }
-        )
-    )
+    points = points_of(sweep, size.preset)
+    found = {
+        "sweep": sweep.name,
+        "preset": size.preset,
+        "episodes": size.episodes,
+        "learners": sweep.learners,
+        "x": {sweep.x_name: sweep.x_values},
+        "environments": digest_of(points.params),
+        "hparams": {name: _plain(getattr(points.hparams, name)) for name in vars(HParams())},
+        "config": {name: value for name, value in asdict(size.config).items() if name != "episodes"},
+    }
+    if sweep.transfers:
+        found["source environment"] = digest_of(paper_params("source", size.preset))
+    return json.loads(json.dumps(found))
+
+
+def _plain(values: jax.Array) -> float | list[float]:
+    """A number that is the same at all points, or one for each; a float32 as the number that was meant."""
+    numbers = [float(str(value)) for value in np.asarray(values)]
+    return numbers[0] if len(set(numbers)) == 1 else numbers
 
 
 def check_folder(folder: Path, sweep: Sweep, size: Size) -> None:
@@ -91,7 +95,8 @@ def dataset(sweep: Sweep, size: Size, seeds: range, log: dict[str, Log], exact: 
     variables: dict[str, Any] = {name: (dims, values) for name, values in stacked.items()}
     for policy in Reference._fields:
         run: LongRun = getattr(exact, policy)
-        variables |= {f"{policy}_{name}": (("point",), np.asarray(value)) for name, value in run._asdict().items()}
+        values = {name: np.asarray(value) for name, value in run._asdict().items()}
+        variables |= {f"{policy}_{name}": (("point", "episode")[: v.ndim], v) for name, v in values.items()}
     coords = {
         "algorithm": list(sweep.learners),
         "point": np.arange(len(sweep.x_values)),

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from jrcjax.checks import refuse
+from jrcjax.hparams import Config, HParams
 from jrcjax.params import EnvParams
 from jrcjax.presets import PRESETS
 from jrcjax.types import choice
@@ -13,7 +14,7 @@ from jrcjax.types import choice
 
 @dataclass(frozen=True)
 class Sweep:
-    """The constants of one sweep; its points differ in parameters alone, never in shapes."""
+    """The constants of one sweep; its points differ in numbers alone, never in shapes."""
 
     name: str
     description: str
@@ -24,6 +25,10 @@ class Sweep:
     """Its value at each point."""
     params_at: Callable[[float, str], EnvParams]
     """(x, preset) to the environment at a point."""
+    hparams_at: Callable[[float], HParams] = lambda x: HParams()
+    """x to the hyperparameters at a point."""
+    transfers: bool = False
+    """Whether each seed brings weights and demonstrations of a source agent of its own."""
 
 
 @dataclass(frozen=True)
@@ -33,9 +38,13 @@ class Size:
     seeds: int = 10
     """Independent seeds, numbered from 0."""
     episodes: int = 1000
-    """Episodes per seed."""
+    """Episodes per seed, in the source as in the target."""
     preset: str = "paper"
     """Table of parameters: "paper" or "paper_table"."""
+    pretraining: int = Config.pretraining
+    """TLwD's updates before its first episode."""
+    demonstrations: int = Config.demonstrations
+    """Transitions that it is given."""
 
     def check(self) -> None:
         """Raises ValueError naming the field, the value and what is allowed."""
@@ -45,8 +54,13 @@ class Size:
                 refuse(field, value if isinstance(value, int | float | str) else str(value), "an integer >= 1")
         choice("preset", self.preset, PRESETS)
 
+    @property
+    def config(self) -> Config:
+        """Static settings of all learners."""
+        return Config(episodes=self.episodes, pretraining=self.pretraining, demonstrations=self.demonstrations)
 
-SMOKE = Size(seeds=2, episodes=20)
+
+SMOKE = Size(seeds=2, episodes=20, pretraining=200, demonstrations=1000)
 """The tiny version of every sweep."""
 
 

@@ -46,18 +46,37 @@ def random_params(seed: int) -> EnvParams:
     )
 
 
+def short_params(name: str) -> EnvParams:
+    """The paper's, with episodes of 20 slots and few objects and placements, which are quick to build in a program."""
+    radar = make_radar(
+        bandwidth=(300e6, 750e6),
+        slope=(1e13, 1.5e13),
+        max_intermediate_frequency=(2e6, 3e6),
+        density=10.0,
+        class_share=(1.0,),
+        size_mean=((4.6, 1.9),),
+        size_std=((0.2, 0.1),),
+        bank_size=64,
+        max_density=20.0,
+    )
+    return jrcjax.paper_params(name).replace(max_steps_in_episode=20, radar=radar)
+
+
 class Environments(dict):
     """Environments by name, made when first asked for."""
 
     def __missing__(self, name: str) -> EnvParams:
         first, second = name.split("-")
-        self[name] = random_params(int(second)) if first == "random" else jrcjax.paper_params(second, first)
+        if first == "random":
+            self[name] = random_params(int(second))
+        else:
+            self[name] = short_params(second) if first == "short" else jrcjax.paper_params(second, first)
         return self[name]
 
 
 @pytest.fixture(scope="session")
 def environments() -> Environments:
-    """The paper's four environments and the random ones: "paper-source", "paper_table-target", "random-0"."""
+    """The paper's, random and short ones: "paper-source", "paper_table-target", "random-0", "short-target"."""
     return Environments()
 
 

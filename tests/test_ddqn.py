@@ -1,23 +1,33 @@
 """Double DQN against a twin of Algorithm 1 written in NumPy, double precision, with backpropagation by hand."""
 
-import itertools
-
 import jax
 import jax.numpy as jnp
 import numpy as np
 import optax
 import pytest
+from backpropagation import (
+    Adam,
+    Descent,
+    Momentum,
+    all_features,
+    assert_same_gradient,
+    backward,
+    forward,
+    layers_of,
+    plain,
+)
 from scipy import stats
 
 import jrcjax
-from jrcjax import exact, replay
+from jrcjax import exact, packing, replay
 from jrcjax.hparams import Config, HParams
 from jrcjax.learners import Spec, ddqn
-from jrcjax.learners.ddqn import QFunction, rows_loss, table_loss
+from jrcjax.learners.ddqn import ddqn_loss
+from jrcjax.learners.q_function import QFunction
 from jrcjax.networks import QNetwork
 from jrcjax.replay import Transition
 
-SPEC = Spec(shape=(3, 2, 2), num_actions=4)
+SPEC = Spec(shape=(3, 2, 2), num_actions=4, episode_slots=300)
 NUM_STATES = 12
 HIDDEN = [(24, 24), (7,), ()]
 
@@ -32,28 +42,6 @@ def _promotion():
 # --- The twin ---------------------------------------------------------------------------------------------------------
 
 
-def all_features(shape) -> np.ndarray:
-    """[F, S], from the definition of the state ids: the first factor is the most significant digit."""
-    levels = np.array(list(itertools.product(*(range(size) for size in shape))), float)
-    return (levels / np.maximum(np.array(shape) - 1, 1)).T
-
-
-def layers_of(weights) -> list[tuple[np.ndarray, np.ndarray]]:
-    """(W, b) of each layer in double precision."""
-    layers = weights["params"]
-    ordered = sorted(layers, key=lambda name: int(name.rsplit("_", 1)[1]))
-    return [(np.asarray(layers[n]["kernel"], float), np.asarray(layers[n]["bias"], float)) for n in ordered]
-
-
-def forward(layers, x: np.ndarray) -> list[np.ndarray]:
-    """Activations of all layers, the input first, for columns x."""
-    activations = [x]
-    for i, (kernel, bias) in enumerate(layers):
-        z = kernel @ activations[-1] + bias[:, None]
-        activations.append(z if i == len(layers) - 1 else np.maximum(z, 0))
-    return activations
-
-
 def loss_and_gradient(layers, target_layers, batch, x: np.ndarray, discount: float):
     """Equation (16) on a batch of id rows and its gradient with respect to `layers`, by backpropagation."""
     states, actions, rewards, next_states, terminals = batch
@@ -65,45 +53,16 @@ def loss_and_gradient(layers, target_layers, batch, x: np.ndarray, discount: flo
     error = y - activations[-1][actions, columns]
     delta = np.zeros_like(activations[-1])
     delta[actions, columns] = -2 * error / len(states)
-    gradient = []
-    for i in reversed(range(len(layers))):
-        gradient.append((delta @ activations[i].T, delta.sum(axis=1)))
-        delta = (layers[i][0].T @ delta) * (activations[i] > 0)
-    return np.mean(error**2), gradient[::-1]
+    return np.mean(error**2), backward(layers, activations, delta)
 
 
-class Adam:
-    """Kingma and Ba, Algorithm 1, without the step size."""
-
-    def __init__(self):
-        self.first, self.second, self.count = 0.0, 0.0, 0
-
-    def __call__(self, g: np.ndarray) -> np.ndarray:
-        self.count += 1
-        self.first = 0.9 * self.first + 0.1 * g
-        self.second = 0.999 * self.second + 0.001 * g**2
-        first, second = self.first / (1 - 0.9**self.count), self.second / (1 - 0.999**self.count)
-        return first / (np.sqrt(second) + 1e-8)
-
-
-class Momentum:
-    """Heavy ball with factor 0.9."""
-
-    def __init__(self):
-        self.velocity = 0.0
-
-    def __call__(self, g: np.ndarray) -> np.ndarray:
-        self.velocity = 0.9 * self.velocity + g
-        return self.velocity
-
-
-class Algorithm1:
+class Algorithm1(Descent):
     """Lines 11 to 18 of the paper's Algorithm 1, one call an update."""
 
     def __init__(self, layers, x, capacity: int, period: int, discount: float, rate: float, rule):
-        self.layers, self.target, self.x = layers, layers, x
-        self.capacity, self.period, self.discount, self.rate = capacity, period, discount, rate
-        self.rules = [(rule(), rule()) for _ in layers]
+        super().__init__(layers, rule, rate)
+        self.target, self.x = layers, x
+        self.capacity, self.period, self.discount = capacity, period, discount
         self.memory, self.oldest, self.updates = [], 0, 0
 
     def store(self, transition: tuple):
@@ -118,10 +77,7 @@ class Algorithm1:
         drawn = [self.memory[(int(word) * len(self.memory)) >> 32] for word in words]
         batch = [np.array(field) for field in zip(*drawn, strict=True)]
         _, gradient = loss_and_gradient(self.layers, self.target, batch, self.x, self.discount)
-        self.layers = [
-            tuple(w - self.rate * rule(g) for w, rule, g in zip(*layer, strict=True))
-            for layer in zip(self.layers, self.rules, gradient, strict=True)
-        ]
+        self.step(gradient)
         self.updates += 1
         if self.updates % self.period == 0:
             self.target = self.layers
@@ -145,22 +101,19 @@ def on_device(batch: Transition) -> Transition:
     return Transition(*(jnp.asarray(f, jnp.float32 if f.dtype.kind == "f" else jnp.int32) for f in batch))
 
 
+def function_of(form: str, hidden) -> QFunction:
+    return QFunction(QNetwork(SPEC.num_actions, hidden), SPEC.shape, form == "table")
+
+
 def networks(hidden):
-    """A Q-function and two sets of weights with biases that are not zero."""
-    function = QFunction(QNetwork(SPEC.num_actions, hidden), SPEC.shape)
+    """Two sets of weights with biases that are not zero."""
 
     def weights(seed: int):
         generator = np.random.default_rng([seed, len(hidden)])
-        zeros = function.network.init(jax.random.key(0), jnp.zeros((len(SPEC.shape), 1)))
+        zeros = function_of("rows", hidden).init(jax.random.key(0))
         return jax.tree.map(lambda a: jnp.asarray(generator.normal(0, 0.5, a.shape), jnp.float32), zeros)
 
-    return function, weights(1), weights(2)
-
-
-def assert_same_gradient(got, wanted, relative: float):
-    for got_layer, wanted_layer in zip(layers_of(got), wanted, strict=True):
-        for g, w in zip(got_layer, wanted_layer, strict=True):
-            np.testing.assert_allclose(g, w, rtol=0, atol=relative * np.abs(w).max())
+    return weights(1), weights(2)
 
 
 # --- Loss and gradient ------------------------------------------------------------------------------------------------
@@ -169,7 +122,7 @@ def assert_same_gradient(got, wanted, relative: float):
 @pytest.mark.parametrize("hidden", HIDDEN)
 @pytest.mark.parametrize("form", ["table", "rows"])
 def test_loss_and_gradient_against_backpropagation_by_hand(form, hidden):
-    function, online, target = networks(hidden)
+    function, (online, target) = function_of(form, hidden), networks(hidden)
     batch, discount = random_batch(0, 64), 0.9
     x, theta, theta_target = all_features(SPEC.shape), layers_of(online), layers_of(target)
     # Otherwise the test could not tell double Q-learning from its single form, nor terminal from other transitions.
@@ -178,12 +131,9 @@ def test_loss_and_gradient_against_backpropagation_by_hand(form, hidden):
     assert (values[0] != values[1])[live].any()
     assert 0 < batch.terminal.sum() < 64
 
-    def loss(weights):
-        if form == "table":
-            return table_loss(function.table(weights), function.table(target), on_device(batch), jnp.float32(discount))
-        return rows_loss(function, weights, target, on_device(batch), jnp.float32(discount))
-
-    got, gradient = jax.value_and_grad(loss)(online)
+    got, gradient = jax.value_and_grad(ddqn_loss, argnums=1)(
+        function, online, function.target_of(target), on_device(batch), jnp.float32(discount)
+    )
     wanted, wanted_gradient = loss_and_gradient(theta, theta_target, batch, x, discount)
     np.testing.assert_allclose(got, wanted, rtol=1e-5)
     assert_same_gradient(gradient, wanted_gradient, 1e-5)
@@ -191,7 +141,7 @@ def test_loss_and_gradient_against_backpropagation_by_hand(form, hidden):
 
 def test_backpropagation_by_hand_against_differences():
     """The reference itself: its gradient is the slope of its loss when the target is held."""
-    _, online, target = networks((7,))
+    online, target = networks((7,))
     batch, x = random_batch(3, 16), all_features(SPEC.shape)
     theta, theta_target = layers_of(online), layers_of(target)
     _, gradient = loss_and_gradient(theta, theta_target, batch, x, 0.0)
@@ -207,27 +157,33 @@ def test_backpropagation_by_hand_against_differences():
 
 @pytest.mark.parametrize("hidden", HIDDEN)
 def test_table_and_rows_give_the_same_gradient(hidden):
-    function, online, target = networks(hidden)
+    online, target = networks(hidden)
     batch, discount = on_device(random_batch(1, 64)), jnp.float32(0.99)
-    rows = jax.grad(lambda w: rows_loss(function, w, target, batch, discount))(online)
-    table = jax.grad(lambda w: table_loss(function.table(w), function.table(target), batch, discount))(online)
+    rows, table = (
+        jax.grad(ddqn_loss, argnums=1)(function, online, function.target_of(target), batch, discount)
+        for function in (function_of("rows", hidden), function_of("table", hidden))
+    )
     assert_same_gradient(rows, layers_of(table), 1e-5)
 
 
-def test_values_are_columns_of_features_in_order_of_ids():
-    function, online, _ = networks((7,))
+@pytest.mark.parametrize("form", ["table", "rows"])
+def test_values_are_columns_of_features_in_order_of_ids(form):
+    function, (online, target) = function_of(form, (7,)), networks((7,))
     wanted = forward(layers_of(online), all_features(SPEC.shape))[-1].T
-    np.testing.assert_allclose(function.table(online), wanted, rtol=1e-5, atol=1e-5)
-    some = jnp.asarray([5, 0, 11])
-    np.testing.assert_allclose(function.values(online, some), wanted[some], rtol=1e-5, atol=1e-5)
+    close = {"rtol": 1e-5, "atol": 1e-5}
+    np.testing.assert_allclose(function.table(online), wanted, **close)
+    some, actions = jnp.asarray([5, 0, 11]), jnp.asarray([3, 0, 1])
+    np.testing.assert_allclose(function.values(online, some), wanted[some], **close)
+    np.testing.assert_allclose(function.of_states(online, some), wanted[some], **close)
+    np.testing.assert_allclose(function.of_state(online, jnp.int32(5)), wanted[5], **close)
+    np.testing.assert_allclose(function.chosen(online, some, actions), wanted[some, actions], **close)
+    of_target, kept = forward(layers_of(target), all_features(SPEC.shape))[-1].T, function.target_of(target)
+    np.testing.assert_allclose(function.greatest(kept, some), of_target[some].max(axis=1), **close)
+    chosen = of_target[some, wanted[some].argmax(axis=1)]
+    np.testing.assert_allclose(function.double_q(online, kept, some), chosen, **close)
 
 
 # --- Algorithm 1 ------------------------------------------------------------------------------------------------------
-
-
-def plain():
-    """The step of equation (21)."""
-    return lambda g: g
 
 
 @pytest.mark.parametrize(
@@ -258,7 +214,7 @@ def test_updates_against_algorithm_1(form, hidden, optimiser, rule, rate):
         twin.update(tuple(field[i].item() for field in transitions), np.asarray(words[i]))
         if i not in (0, 1, 14, 15, 16, 31, 59):  # around the moments when the ring is full
             continue
-        held = replay.unpack(state.ring[: len(twin.memory)], replay.layout(NUM_STATES, SPEC.num_actions))
+        held = packing.unpack(state.ring[: len(twin.memory)], replay.layout(NUM_STATES, SPEC.num_actions))
         assert list(zip(*(np.asarray(f).tolist() for f in held), strict=True)) == twin.memory
     # Rounding: each of 60 steps adds one float32 rounding of weights below 2 (1e-7) and, from the gradient's relative
     # error of 1e-5, at most 1e-5 of a step of at most 1e-2 (1e-7): 1e-5 in all. The weights move by far more.
@@ -273,8 +229,7 @@ def test_updates_against_algorithm_1(form, hidden, optimiser, rule, rate):
 def test_target_is_copied_after_every_period_updates_and_never_else(form, period):
     learner = ddqn(SPEC, Config(batch_size=8, replay_capacity=16, hidden=(7,), form=form))
     hparams = HParams(target_period=jnp.int32(period))
-    function = QFunction(QNetwork(SPEC.num_actions, (7,)), SPEC.shape)
-    as_target = function.table if form == "table" else lambda weights: weights
+    as_target = function_of(form, (7,)).target_of
     states = [learner.init(jax.random.key(0), hparams)]
     transitions = on_device(random_batch(2, 17))
     words = jax.random.bits(jax.random.key(1), (17, 8), jnp.uint32)

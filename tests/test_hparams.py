@@ -12,19 +12,35 @@ from hypothesis import strategies as st
 
 import jrcjax
 from jrcjax.hparams import OPTIMISERS, Config, HParams, check_config, check_hparams, optimiser_of
+from jrcjax.learners import LEARNERS, Spec
+from jrcjax.types import INITIAL_WEIGHTS
 
 BELOW_0 = st.floats(-1e6, -1e-6)
 ABOVE_1 = st.floats(1.001, 1e6)
 NO_NUMBERS = st.sampled_from([float("nan"), float("inf"), -float("inf"), "0.5", None, [0.1, 0.2], np.ones(1)])
+NO_SHARE = st.one_of(BELOW_0, ABOVE_1, NO_NUMBERS)
+NOT_POSITIVE = st.one_of(BELOW_0, st.just(0.0), NO_NUMBERS)
+NEGATIVE = st.one_of(BELOW_0, NO_NUMBERS)
 OUTSIDE = {
     "discount": st.one_of(BELOW_0, st.floats(1.0, 1e6), NO_NUMBERS),
-    "epsilon_start": st.one_of(BELOW_0, ABOVE_1, NO_NUMBERS),
-    "epsilon_end": st.one_of(BELOW_0, ABOVE_1, NO_NUMBERS),
-    "epsilon_slots": st.one_of(BELOW_0, st.just(0.0), NO_NUMBERS),
-    "learning_rate": st.one_of(BELOW_0, st.just(0.0), NO_NUMBERS),
+    "epsilon_start": NO_SHARE,
+    "epsilon_end": NO_SHARE,
+    "epsilon_slots": NOT_POSITIVE,
+    "learning_rate": NOT_POSITIVE,
     "target_period": st.one_of(st.integers(-(10**6), 0), st.floats(1.1, 1.9), NO_NUMBERS),
     "step_exponent": st.one_of(st.floats(-10, 0.5), ABOVE_1, NO_NUMBERS),
-    "step_constant": st.one_of(BELOW_0, ABOVE_1, NO_NUMBERS),
+    "step_constant": NO_SHARE,
+    "priority_exponent": NO_SHARE,
+    "priority_constant": NOT_POSITIVE,
+    "demonstration_constant": NOT_POSITIVE,
+    "importance_start": NO_SHARE,
+    "importance_end": NO_SHARE,
+    "n_step_weight": NEGATIVE,
+    "margin_weight": NEGATIVE,
+    "l2_weight": NEGATIVE,
+    "margin": NEGATIVE,
+    "demonstration_epsilon": NO_SHARE,
+    "initial_weights": st.one_of(st.integers(-(10**6), -1), st.integers(2, 10**6), st.sampled_from([0.0, True, "0"])),
 }
 TOO_FEW, TOO_MANY = st.integers(-100, 0), st.integers(2**31, 2**40)
 NO_COUNTS = st.one_of(TOO_FEW, TOO_MANY, st.floats(1, 10), st.sampled_from([True, "3", None]))
@@ -32,6 +48,9 @@ BAD_SETTINGS = {
     "episodes": NO_COUNTS,
     "batch_size": NO_COUNTS,
     "replay_capacity": NO_COUNTS,
+    "demonstrations": NO_COUNTS,
+    "pretraining": st.one_of(st.integers(-100, -1), TOO_MANY, st.floats(1, 10), st.sampled_from([True, "3", None])),
+    "n_step": NO_COUNTS,
     "hidden": st.sampled_from([24, [24, 24], (24, 0), (24, -1), (24.0,), ("24",), None]),
     "optimiser": st.sampled_from(["Adam", "", "adamw", None, 3, lambda: None]),
     "form": st.sampled_from(["Table", "", "row", None, 1]),
@@ -78,11 +97,20 @@ def test_the_refusals_cover_all_fields():
     period=st.integers(1, 10**6),
     exponent=st.floats(0.501, 1),
     constant=st.floats(0, 1),
+    alpha=st.floats(0, 1),
+    constants=st.tuples(st.floats(1e-9, 1e6), st.floats(1e-9, 1e6)),
+    betas=st.tuples(st.floats(0, 1), st.floats(0, 1)),
+    weights=st.tuples(*[st.floats(0, 1e6)] * 4),
+    share=st.floats(0, 1),
+    start=st.sampled_from(range(len(INITIAL_WEIGHTS))),
 )
-def test_good_hyperparameters_are_accepted(discount, epsilons, slots, rate, period, exponent, constant):
-    check_hparams(HParams(discount, *epsilons, slots, rate, period, exponent, constant))
-    as_float = [jnp.float32(x) for x in (discount, *epsilons, slots, rate)]
-    check_hparams(HParams(*as_float, jnp.int32(period), jnp.float32(exponent), jnp.float32(constant)))
+def test_good_hyperparameters_are_accepted(
+    discount, epsilons, slots, rate, period, exponent, constant, alpha, constants, betas, weights, share, start
+):
+    first, later = (discount, *epsilons, slots, rate), (exponent, constant, alpha, *constants, *betas, *weights, share)
+    check_hparams(HParams(*first, period, *later, start))
+    first, later = ([jnp.float32(x) for x in numbers] for numbers in (first, later))
+    check_hparams(HParams(*first, jnp.int32(period), *later, jnp.int32(start)))
 
 
 CLIPPED = optax.chain(optax.clip(1.0), optax.scale_by_adam())
@@ -90,7 +118,26 @@ CLIPPED = optax.chain(optax.clip(1.0), optax.scale_by_adam())
 
 @pytest.mark.parametrize("optimiser", [*OPTIMISERS, optax.identity(), CLIPPED])
 def test_good_settings_are_accepted(optimiser):
-    check_config(Config(episodes=1, batch_size=1, replay_capacity=1, hidden=(), optimiser=optimiser, form="rows"))
+    ones = {"episodes": 1, "batch_size": 1, "replay_capacity": 1, "demonstrations": 1, "pretraining": 0, "n_step": 1}
+    check_config(Config(**ones, hidden=(), optimiser=optimiser, form="rows"))
+
+
+@pytest.mark.parametrize("run", [jrcjax.train, jrcjax.train_agents])
+@pytest.mark.parametrize("demonstrations", [50, 51])
+def test_a_memory_has_room_for_more_than_demonstrations(run, demonstrations):
+    """For the learner that puts them there, and for no other."""
+    config = Config(episodes=1, batch_size=1, replay_capacity=50, demonstrations=demonstrations)
+    keys = jax.random.split(jax.random.key(0), 2)
+    with pytest.raises(ValueError, match=rf"^config\.demonstrations: {demonstrations}; allowed: .*replay_capacity"):
+        run(
+            keys if run is jrcjax.train_agents else keys[0],
+            jrcjax.paper_params("target"),
+            learner="tlwd",
+            config=config,
+        )
+    check_config(config)
+    LEARNERS["ddqn"](Spec((2, 2), 4, 300), config)
+    LEARNERS["tlwd"](Spec((2, 2), 4, 300), Config(replay_capacity=50, demonstrations=49))
 
 
 def test_other_types_are_refused():
@@ -104,7 +151,9 @@ def test_other_types_are_refused():
 def test_unknown_learners_are_refused_with_the_known_ones(name):
     with pytest.raises(ValueError, match="learner") as refusal:
         train(learner=name)
-    assert all(repr(known) in str(refusal.value) for known in ("round_robin", "q_learning", "ddqn", name))
+    assert all(
+        repr(known) in str(refusal.value) for known in ("round_robin", "q_learning", "ddqn", "dpr", "tlwd", name)
+    )
 
 
 def test_bad_environments_are_refused_before_anything_is_made():
@@ -125,13 +174,18 @@ def test_defaults_are_table_1():
     hparams, config = HParams(), Config()
     wanted = {
         "discount": 0.99, "epsilon_start": 1.0, "epsilon_end": 0.01, "epsilon_slots": 30_000, "target_period": 300,
-        "learning_rate": 1e-3, "step_exponent": 0.7, "step_constant": 0.0,
+        "learning_rate": 1e-3, "step_exponent": 0.7, "step_constant": 0.0, "priority_exponent": 0.4,
+        "priority_constant": 0.001, "demonstration_constant": 1.0, "importance_start": 0.6, "importance_end": 1.0,
+        "n_step_weight": 1.0, "margin_weight": 1.0, "l2_weight": 1e-5, "margin": 1.0, "demonstration_epsilon": 0.01,
+        "initial_weights": 0,
     }  # fmt: skip
+    assert INITIAL_WEIGHTS[0] == "random"
     for name, number in wanted.items():
         assert float(getattr(hparams, name)) == float(np.float32(number))
     assert all(leaf.shape == () for leaf in jax.tree.leaves(hparams))
     assert len(jax.tree.leaves(hparams)) == len(wanted)
     assert (config.episodes, config.batch_size, config.replay_capacity, config.hidden) == (1000, 64, 50_000, (24, 24))
+    assert (config.demonstrations, config.pretraining, config.n_step) == (20_000, 10_000, 10)
     assert (config.optimiser, config.form) == ("adam", "auto")
 
 

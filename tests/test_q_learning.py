@@ -7,13 +7,13 @@ import pytest
 from scipy import linalg, stats
 
 import jrcjax
-from jrcjax import events, exact, parallel, training
+from jrcjax import episodes, events, exact, parallel
 from jrcjax.hparams import Config, HParams
 from jrcjax.learners import Spec, q_learning, round_robin
 from jrcjax.params import EnvParams, make_factor
 from jrcjax.replay import Transition
 
-SPEC = Spec(shape=(3, 2, 2), num_actions=4)
+SPEC = Spec(shape=(3, 2, 2), num_actions=4, episode_slots=300)
 NUM_STATES = 12
 
 
@@ -125,14 +125,14 @@ CHUNK, CHUNKS, SEEDS = 2, 50, 16
 
 def learn(params: EnvParams, hparams: HParams) -> np.ndarray:
     """Q after each chunk of CHUNK episodes of uniform exploration, [CHUNKS, SEEDS, S, A]."""
-    rule = training.learner_for("q_learning", params, Config())
+    rule = episodes.learner_for("q_learning", params, Config())
 
     def run(shared, key):
         def chunk(agent, i):
-            agent, _ = training.run_episodes(agent, i * CHUNK, CHUNK, *shared, rule)
+            agent, _ = episodes.run_episodes(agent, i * CHUNK, CHUNK, *shared, rule)
             return agent, agent.learner.q
 
-        return jax.lax.scan(chunk, training.init_agent(key, shared[1], rule), jnp.arange(CHUNKS))[1]
+        return jax.lax.scan(chunk, episodes.init_agent(key, shared[1], rule), jnp.arange(CHUNKS))[1]
 
     keys = jax.random.split(jax.random.key(0), parallel.padded(SEEDS))
     q = parallel.over_agents(run)((params, hparams), keys)
@@ -172,7 +172,7 @@ def test_converges_to_the_solvers_values(levels, persistence, gamma, exponent, c
 
 
 def test_round_robin_takes_all_actions_in_turn():
-    learner = round_robin(Spec(shape=(3, 2), num_actions=5), Config())
+    learner = round_robin(Spec(shape=(3, 2), num_actions=5, episode_slots=300), Config())
     actions = [int(learner.act((), jnp.int32(3), jnp.int32(t), jnp.zeros(0, jnp.uint32), HParams())) for t in range(12)]
     assert actions == [0, 1, 2, 3, 4, 0, 1, 2, 3, 4, 0, 1]
     np.testing.assert_array_equal(learner.policy(()), np.full((6, 5), np.float32(0.2)))

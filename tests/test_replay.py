@@ -57,39 +57,6 @@ def test_ring_against_a_list_of_the_latest(capacity, transitions):
         assert Counter(as_tuples(held)) == Counter(twin)
 
 
-@pytest.mark.parametrize(
-    ("states", "actions", "words"),
-    [(1, 1, 1), (32, 4, 1), (2**14, 4, 1), (2**15, 4, 2), (2**16, 2**15, 2), (2**31 - 1, 4, 3)],
-)
-def test_layout_takes_as_few_words_as_the_ids_fit(states, actions, words):
-    where = replay.layout(states, actions)
-    assert where.words == words
-    assert replay.init(3, where).shape == (3, words + 1)
-    taken = [set() for _ in range(words)]
-    for word, shift, bits in where.fields:
-        field = set(range(shift, shift + bits))
-        assert max(field) < 32
-        assert not taken[word] & field  # no two fields share a bit
-        taken[word] |= field
-
-
-@settings(max_examples=150, deadline=None, derandomize=True)
-@given(st.data(), st.sampled_from([1, 2, 3, 32, 1000, 2**15, 10**6, 2**31 - 1]), st.integers(1, 70_000))
-def test_pack_and_unpack_are_inverse(data, states, actions):
-    where = replay.layout(states, actions)
-    ids = st.one_of(st.integers(0, states - 1), st.just(states - 1))  # the largest id has all bits in use
-    transition = (
-        data.draw(ids),
-        data.draw(st.one_of(st.integers(0, actions - 1), st.just(actions - 1))),
-        data.draw(st.floats(width=32, allow_nan=False)),
-        data.draw(ids),
-        data.draw(st.integers(0, 1)),
-    )
-    row = replay.pack(Transition(*transition), where)
-    assert row.shape == (where.words + 1,)
-    assert as_tuples(replay.unpack(row[None], where)) == [transition]
-
-
 @pytest.mark.parametrize(("capacity", "count"), [(64, 40), (64, 64), (64, 150)])
 def test_samples_are_uniform_over_what_is_held(capacity, count):
     words = jax.random.bits(jax.random.key(count), (40_000,), jnp.uint32)

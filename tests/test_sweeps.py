@@ -1,6 +1,8 @@
 """Sweeps end to end at a tiny size: parts on disk, resuming, refusing, and agreement with single runs."""
 
+import io
 import json
+from dataclasses import replace
 
 import jax
 import jax.numpy as jnp
@@ -16,8 +18,9 @@ from sweeps import store
 from sweeps.__main__ import main
 from sweeps.program import chunk_of, points_of, reference_of
 from sweeps.registry import SWEEPS
-from sweeps.run import SEEDS_PER_PART, blocks, run_sweep
-from sweeps.sweep import Size, size_of
+from sweeps.run import SEEDS_PER_PART, blocks, expected_seconds, run_sweep
+from sweeps.sources import SOURCE, missing_sources, sources_of
+from sweeps.sweep import SMOKE, Size, size_of
 
 FIG5A = SWEEPS["fig5a"]
 SIZE = Size(seeds=3, episodes=2)
@@ -75,9 +78,9 @@ def test_a_part_of_another_configuration_is_refused_also_without_a_manifest(tmp_
 
 
 def test_the_digest_sees_every_number_of_an_environment():
-    points = points_of(FIG5A, "paper")
+    points = points_of(FIG5A, "paper").params
     other = points.replace(reward_weights=points.reward_weights.at[0, 2].add(1e-6))
-    assert store.digest_of(points) == store.digest_of(points_of(FIG5A, "paper"))
+    assert store.digest_of(points) == store.digest_of(points_of(FIG5A, "paper").params)
     assert store.digest_of(points) != store.digest_of(other)
 
 
@@ -117,7 +120,7 @@ def test_blocks_cover_what_is_missing_once_and_keep_to_the_grid():
     assert all(block.start // SEEDS_PER_PART == (block.stop - 1) // SEEDS_PER_PART for block in todo)
 
 
-@pytest.mark.parametrize(("episodes", "chunk"), [(1000, 50), (20, 20), (7, 7), (53, 1), (96, 48)])
+@pytest.mark.parametrize(("episodes", "chunk"), [(1000, 20), (20, 20), (7, 7), (53, 1), (96, 16)])
 def test_chunks_divide_the_episodes(episodes, chunk):
     assert chunk_of(episodes) == chunk
 
@@ -140,10 +143,16 @@ def test_the_program_is_compiled_once_for_all_blocks(tmp_path):
 
 def test_the_reference_of_stacked_points_is_that_of_each_alone():
     points = points_of(FIG5A, "paper_table")
-    assert points.radar.density.shape == (1,)
+    assert points.params.radar.density.shape == (1,)
     params = jrcjax.paper_params("source", "paper_table")
     best = exact.evaluate_policy(params, exact.optimal_policy(params))
-    np.testing.assert_allclose(reference_of(points).optimum.reward[0], best.reward, rtol=1e-6)
+    reference = reference_of(points, 150)
+    np.testing.assert_allclose(reference.optimum.reward[0], best.reward, rtol=1e-6)
+    # Episode 151 and all after it explore with the smallest epsilon, episode 1 with nearly the largest.
+    for episode, epsilon in ((149, 0.01), (0, 1 - 0.99 * 149.5 / 30_000)):
+        policy = (1 - epsilon) * exact.optimal_policy(params) + epsilon / params.num_actions
+        wanted = exact.evaluate_policy(params, policy).reward
+        np.testing.assert_allclose(reference.explored.reward[0, episode], wanted, rtol=1e-5)
 
 
 @pytest.mark.parametrize("field", ["seeds", "episodes"])
@@ -157,7 +166,7 @@ def test_bad_sizes_are_refused(field, value, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["run", "fig99"], "name: 'fig99' is unknown; allowed: 'fig5a'"),
+        (["run", "fig99"], "name: 'fig99' is unknown; allowed: 'fig5a', 'fig5b', 'fig6'"),
         (["run", "fig5a", "--seeds", "0"], "seeds: 0; allowed: an integer >= 1"),
         (["run", "fig5a", "--preset", "table"], "preset: 'table' is unknown; allowed: 'paper', 'paper_table'"),
     ],
@@ -174,8 +183,8 @@ def test_list_names_every_sweep(capsys):
 
 
 def test_options_overrule_the_smoke_size():
-    assert size_of(None, None, "paper", smoke=True) == Size(2, 20, "paper")
-    assert size_of(7, None, "paper_table", smoke=True) == Size(7, 20, "paper_table")
+    assert size_of(None, None, "paper", smoke=True) == SMOKE
+    assert size_of(7, None, "paper_table", smoke=True) == replace(SMOKE, seeds=7, preset="paper_table")
     assert size_of(None, 5, "paper", smoke=False) == Size(10, 5, "paper")
 
 
@@ -183,3 +192,127 @@ def test_keys_of_seeds_do_not_depend_on_how_many_there_are():
     few = [jax.random.fold_in(jax.random.key(0), i) for i in range(3)]
     many = jax.vmap(lambda i: jax.random.fold_in(jax.random.key(0), i))(jnp.arange(100))
     assert all((jax.random.key_data(a) == jax.random.key_data(b)).all() for a, b in zip(few, many[:3], strict=True))
+
+
+# --- Sweeps that transfer ---------------------------------------------------------------------------------------------
+
+TINY = Size(seeds=2, episodes=2, pretraining=12, demonstrations=70)
+PAIR = replace(
+    SWEEPS["fig6"],
+    name="pair",
+    x_values=(0.1, 0.9),
+    hparams_at=lambda x: jrcjax.HParams(priority_exponent=jnp.float32(0.0 if x > 0.5 else 0.4)),
+)
+
+
+@pytest.fixture(scope="module")
+def pair(tmp_path_factory):
+    return run_sweep(PAIR, TINY, tmp_path_factory.mktemp("results"), QUIET, resume=False)
+
+
+@pytest.mark.parametrize(("point", "x"), [(0, 0.1), (1, 0.9)])
+def test_a_seed_of_a_transfer_sweep_is_a_single_run_of_that_key(pair, point, x):
+    data = store.load(pair, TINY.seeds)
+    key = jax.random.fold_in(jax.random.key(0), 1)
+    source, target = jrcjax.paper_params("source"), PAIR.params_at(x, "paper")
+    alone = jrcjax.transfer(key, source, target, PAIR.hparams_at(x), config=TINY.config, learners=PAIR.learners)
+    for learner in PAIR.learners:
+        swept = data.sel(algorithm=learner, seed=1).isel(point=point)
+        for name in ("reward", "throughput", "miss_detection", "policy_reward"):
+            # Batched and single programs round differently, which 600 slots of training do not amplify beyond this.
+            np.testing.assert_allclose(swept[name].values, getattr(alone.logs[learner], name), rtol=1e-4)
+    kept = sources_of(TINY, range(2), pair.parent, lambda seconds: None)
+    for held, wanted in zip(jax.tree.leaves(kept), jax.tree.leaves(alone.source), strict=True):
+        np.testing.assert_allclose(held[1], wanted, rtol=1e-4, atol=1e-5)
+
+
+def test_source_agents_are_trained_once_for_all_sweeps(pair):
+    part = store.part_path(pair.parent / "source", range(0, 2))
+    before = part.read_bytes()
+    assert missing_sources(TINY, range(2), pair.parent) == range(0)
+    assert missing_sources(TINY, range(4), pair.parent) == range(2, 4)
+    run_sweep(replace(PAIR, name="other", learners=("dpr",)), TINY, pair.parent, QUIET, resume=False)
+    assert part.read_bytes() == before
+    assert [path.name for path in (pair.parent / "source").glob("*.nc")] == [part.name]
+
+
+def test_sources_come_back_from_disk_as_they_were(pair):
+    trained = sources_of(TINY, range(2), pair.parent, lambda seconds: None)
+    some = sources_of(TINY, range(1, 2), pair.parent, lambda seconds: None)
+    assert trained.demonstrations.state.shape == (2, 70)
+    jax.tree.map(lambda whole, part: np.testing.assert_array_equal(whole[1:], part), trained, some)
+    for a, b in zip(trained.demonstrations, some.demonstrations, strict=True):
+        assert a.dtype == b.dtype
+
+
+def test_sources_of_another_configuration_are_refused(pair):
+    with pytest.raises(store.ConfigurationMismatch, match="demonstrations"):
+        run_sweep(PAIR, replace(TINY, demonstrations=71), pair.parent, QUIET, resume=True)
+
+
+def test_hyperparameters_of_points_are_part_of_the_configuration():
+    found = store.configuration(PAIR, TINY)
+    assert found["hparams"]["priority_exponent"] == [0.4, 0.0]
+    assert found["hparams"]["discount"] == 0.99
+    assert found["config"]["pretraining"] == 12
+    assert found["source environment"] == store.configuration(SOURCE, TINY)["environments"]
+
+
+def test_a_transfer_sweep_compiles_once_for_all_blocks(tmp_path):
+    compiled = []
+
+    def listen(event, duration, **about):
+        if event == "/jax/core/compile/backend_compile_duration":
+            compiled.append(about.get("fun_name"))
+
+    jax.monitoring.register_event_duration_secs_listener(listen)
+    try:
+        size = replace(TINY, seeds=2 * SEEDS_PER_PART, episodes=1, pretraining=3)
+        run_sweep(replace(PAIR, learners=("tlwd", "dpr")), size, tmp_path, QUIET, resume=False)
+    finally:
+        jax.monitoring.unregister_event_duration_listener(listen)
+    # Source agents start, advance and demonstrate; the sweep's agents start and advance.
+    assert compiled.count("jit(checked)") == 5
+
+
+def by_name(tree) -> dict:
+    leaves = jax.tree_util.tree_leaves_with_path(tree)
+    return {jax.tree_util.keystr(path, simple=True, separator="."): leaf for path, leaf in leaves}
+
+
+@pytest.mark.parametrize("name", list(SWEEPS))
+def test_points_are_what_the_paper_varies(name):
+    sweep = SWEEPS[name]
+    params, hparams = points_of(sweep, "paper")
+    base = jrcjax.paper_params("source" if name == "fig5a" else "target")
+    varied = {
+        "fig6": {"speed.event_probability": params.speed.event_probability[:, 1]},
+        "fig7": {
+            f"{f}.prior": getattr(params, f).prior[:, 0] for f in ("channel", "road", "weather", "speed", "nearby")
+        },
+        "fig8": {"radar.density": params.radar.density},
+        "fig9": {"priority_exponent": hparams.priority_exponent / 0.4, "importance_end": hparams.importance_end},
+    }.get(name, {})
+    for values in varied.values():
+        np.testing.assert_allclose(values, sweep.x_values, rtol=1e-6)
+    # Nothing else differs from the paper's environment.
+    derived = {"fig8": ("radar.miss_bank", "radar.bank_inputs")}.get(name, ())
+    wanted = by_name(base)
+    for field, leaf in by_name(params).items():
+        if field not in varied and field not in derived:
+            np.testing.assert_array_equal(leaf, np.broadcast_to(wanted[field], leaf.shape))
+    assert sweep.transfers == (name != "fig5a")
+
+
+def test_the_expected_time_grows_with_the_work_and_is_nothing_for_nothing(tmp_path):
+    one, more = (expected_seconds([FIG5A], Size(seeds=10, episodes=e), tmp_path) for e in (100, 300))
+    np.testing.assert_allclose(more, 3 * one)
+    assert expected_seconds([SWEEPS["fig6"]], Size(), tmp_path) > expected_seconds([SWEEPS["fig5b"]], Size(), tmp_path)
+    assert expected_seconds([], Size(), tmp_path) == 0
+
+
+def test_the_expected_time_is_told_before_and_counts_what_is_there(folder):
+    console = Console(record=True, width=200, file=io.StringIO())
+    run_sweep(FIG5A, Size(seeds=6, episodes=2), folder.parent, console, resume=True)
+    assert "fig5a: 3 agents (points x seeds x learners), 2 episodes each; expected 0 s" in console.export_text()
+    assert expected_seconds([FIG5A], Size(seeds=6, episodes=2), folder.parent) == 0

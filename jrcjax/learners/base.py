@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from jrcjax.hparams import Config, HParams
+from jrcjax.n_step import NStepTransition
 from jrcjax.replay import Transition
 from jrcjax.types import Float, Int, Key, Words
 
@@ -20,6 +21,17 @@ class Spec(NamedTuple):
     """Levels per factor; S is their product."""
     num_actions: int
     """A."""
+    episode_slots: int
+    """Slots of every episode."""
+
+
+class Source(NamedTuple):
+    """What transfer learners take over from the source environment."""
+
+    weights: Any
+    """The source agent's network, theta*_S."""
+    demonstrations: NStepTransition
+    """D_S, what the agent did in the source environment, [demonstrations]."""
 
 
 class Learner(NamedTuple):
@@ -27,13 +39,16 @@ class Learner(NamedTuple):
 
     num_words: int
     """Random words per slot, split between `act` (the first two) and `update`."""
-    init: Callable[[Key, HParams], State]
+    init: Callable[[Key, HParams, Source | None], State]
+    """(key, hparams, source) to the learner state before the first slot; pre-training is done here."""
     act: Callable[[State, Int, Int, Words, HParams], Int]
     """(learner state, state id, slot, words, hparams) to an action."""
     update: Callable[[State, Transition, Int, Words, HParams], State]
     """(learner state, transition, slot, words, hparams) to the next learner state."""
     policy: Callable[[State], Float]
     """Learner state to the policy without exploration, [S, A] probabilities."""
+    needs_source: bool = False
+    """Whether `init` needs a source."""
 
 
 LearnerFactory = Callable[[Spec, Config], Learner]

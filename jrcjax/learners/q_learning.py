@@ -30,7 +30,7 @@ def q_learning(spec: Spec, config: Config) -> Learner:
     del config
     shape = (num_states(spec.shape), spec.num_actions)
 
-    def init(key, hparams: HParams) -> QState:
+    def init(key, hparams: HParams, source=None) -> QState:
         return QState(jnp.zeros(shape), jnp.zeros(shape, jnp.int32))
 
     def act(state: QState, state_id, slot, words, hparams: HParams):

@@ -15,7 +15,7 @@ def round_robin(spec: Spec, config: Config) -> Learner:
     uniform = jnp.full((num_states(spec.shape), spec.num_actions), 1.0 / spec.num_actions)
     return Learner(
         num_words=0,
-        init=lambda key, hparams: (),
+        init=lambda key, hparams, source=None: (),
         act=lambda state, state_id, slot, words, hparams: (slot % spec.num_actions).astype(jnp.int32),
         update=lambda state, transition, slot, words, hparams: state,
         policy=lambda state: uniform,

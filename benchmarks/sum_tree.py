@@ -1,0 +1,67 @@
+"""Claim: 16 children per node are the fastest for the paper's replay memory of 50,000 transitions.
+
+Draws 64 leaves and gives them new values, again and again, in 16 trees on all cores. Typical printout:
+
+    children per node   us per draw and update   (range)
+                    4                     5.11   (4.95-5.30)
+                    8                     4.02   (3.90-4.11)
+                   16                     3.40   (3.31-3.52)
+                   32                     4.63   (4.50-4.80)
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+from typing import Any
+
+LEAVES, BATCH, TREES = 50_000, 64, 16
+
+
+def run(quick: bool) -> list[dict[str, Any]]:
+    """Measures all radices, one repetition of each in turn, and prints a table."""
+    from jrcjax import parallel
+
+    parallel.use_all_cores()
+    import jax
+    import jax.numpy as jnp
+
+    from jrcjax import rng, sum_tree
+
+    steps = 1000 if quick else 5000
+
+    def of(radix: int):
+        sum_tree.RADIX = radix
+        where = sum_tree.layout(LEAVES)
+
+        def one(_, key):
+            def step(tree, words):
+                indices, values = sum_tree.sample(tree, words, where)
+                return sum_tree.update(tree, indices, values * (0.5 + rng.uniform(words[0])), where), None
+
+            words = jax.random.bits(key, (steps, sum_tree.NUM_WORDS, BATCH), jnp.uint32)
+            tree = sum_tree.init(jax.random.uniform(key, (LEAVES,)) + 0.1, where)
+            return sum_tree.total(jax.lax.scan(step, tree, words)[0])
+
+        run = parallel.over_agents(one)
+        keys = jax.random.split(jax.random.key(0), TREES)
+        return run.lower((), keys).compile(), keys
+
+    default = sum_tree.RADIX
+    try:
+        programs = {radix: of(radix) for radix in (4, 8, 16, 32)}
+    finally:
+        sum_tree.RADIX = default
+    times: dict[int, list[float]] = {radix: [] for radix in programs}
+    for _ in range(3 if quick else 7):
+        for radix, (program, keys) in programs.items():
+            begin = time.perf_counter()
+            jax.block_until_ready(program((), keys))
+            times[radix].append((time.perf_counter() - begin) / (TREES * steps) * 1e6)
+    print(f"{'children per node':>17s}{'us per draw and update':>25s}   (range)")
+    for radix, us in times.items():
+        print(f"{radix:17d}{statistics.median(us):25.2f}   ({min(us):.2f}-{max(us):.2f})")
+    return [
+        {"case": f"sum_tree_radix_{radix}", "agents": TREES, "us_per_agent_step": statistics.median(us)}
+        for radix, us in times.items()
+    ]

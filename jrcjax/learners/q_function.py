@@ -1,0 +1,84 @@
+"""The network of one problem as a function of weights and state ids, on all states at once or on rows of a batch.
+
+With few states the network is evaluated once per slot on all of them. The table serves the action, the target and
+the loss; the target network is then a copy of its table, since its weights are used for nothing else.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jrcjax import states
+from jrcjax.hparams import Config
+from jrcjax.learners.base import Spec
+from jrcjax.networks import QNetwork
+from jrcjax.types import Float, Int, Key
+from jrcjax.value_learning import double_q_value
+
+
+class QFunction(NamedTuple):
+    """Q(s, a; theta)."""
+
+    network: QNetwork
+    shape: tuple[int, ...]
+    as_table: bool
+    """Whether values are looked up in the table of all states."""
+
+    def init(self, key: Key) -> Any:
+        """Random weights."""
+        return self.network.init(key, jnp.zeros((len(self.shape), 1)))
+
+    def values(self, weights: Any, ids: Int) -> Float:
+        """Q(s, .; theta) of states [N], [N, A]."""
+        return self.network.apply(weights, states.features_of(ids, self.shape).T).T  # pyright: ignore
+
+    def table(self, weights: Any) -> Float:
+        """Q(s, .; theta) of all states, [S, A]."""
+        return self.values(weights, jnp.arange(states.num_states(self.shape)))
+
+    def of_state(self, weights: Any, state: Int) -> Float:
+        """Q(s, .; theta) of one state, [A]."""
+        return self.table(weights)[state] if self.as_table else self.values(weights, state[None])[0]
+
+    def target_of(self, weights: Any) -> Any:
+        """The target network that is kept: its table [S, A], or its weights."""
+        return self.table(weights) if self.as_table else weights
+
+    def chosen(self, weights: Any, ids: Int, actions: Int) -> Float:
+        """Q(s, a; theta) of a batch of states and actions, [B]."""
+        if self.as_table:
+            return self.table(weights).at[ids, actions].get(mode="promise_in_bounds")
+        return jnp.take_along_axis(self.values(weights, ids), actions[:, None], axis=1)[:, 0]
+
+    def of_states(self, weights: Any, ids: Int) -> Float:
+        """Q(s, .; theta) of a batch of states, [B, A]."""
+        if self.as_table:
+            return self.table(weights).at[ids].get(mode="promise_in_bounds")
+        return self.values(weights, ids)
+
+    def double_q(self, weights: Any, target: Any, ids: Int) -> Float:
+        """Q(s', argmax_a Q(s', a; theta); theta') of a batch of next states, [B]; no gradient flows through it."""
+        frozen = jax.lax.stop_gradient(weights)
+        if self.as_table:
+            return double_q_value(self.table(frozen), target).at[ids].get(mode="promise_in_bounds")
+        return double_q_value(self.values(frozen, ids), self.values(target, ids))
+
+    def greatest(self, target: Any, ids: Int) -> Float:
+        """max_a Q(s, a; theta') of a batch of states, [B]."""
+        if self.as_table:
+            return target.max(axis=-1).at[ids].get(mode="promise_in_bounds")
+        return self.values(target, ids).max(axis=-1)
+
+
+def q_function(spec: Spec, config: Config) -> QFunction:
+    """The network of `config` for a problem."""
+    as_table = config.uses_table(states.num_states(spec.shape))
+    return QFunction(QNetwork(spec.num_actions, config.hidden), spec.shape, as_table)
+
+
+def copied_if(due: Any, new: Any, old: Any) -> Any:
+    """The copying of theta into theta', if it is `due`."""
+    return jax.tree.map(lambda new, old: jnp.where(due, new, old), new, old)

@@ -1,0 +1,17 @@
+"""Fig. 5(b): learning curves in the target environment."""
+
+from __future__ import annotations
+
+from jrcjax.presets import paper_params
+from jrcjax.transfer import TARGET_LEARNERS
+from sweeps.sweep import Sweep
+
+FIG5B = Sweep(
+    name="fig5b",
+    description="learning curves in the target environment: TLwD, DPR, DDQN, Q-learning, Round Robin",
+    learners=TARGET_LEARNERS,
+    x_name="environment",
+    x_values=(0.0,),
+    params_at=lambda x, preset: paper_params("target", preset),
+    transfers=True,
+)
