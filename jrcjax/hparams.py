@@ -141,7 +141,7 @@ def check_hparams(hparams: HParams) -> None:
     for name in ("priority_exponent", "importance_start", "importance_end", "demonstration_epsilon"):
         require(f"hparams.{name}", getattr(hparams, name), (), unit, "a number in [0, 1]")
     for name in ("priority_constant", "demonstration_constant"):
-        require(f"hparams.{name}", getattr(hparams, name), (), lambda x: x > 0, "a number > 0")
+        require(f"hparams.{name}", getattr(hparams, name), (), lambda x: x >= 1e-30, "a number >= 1e-30")
     for name in ("n_step_weight", "margin_weight", "l2_weight", "margin"):
         require(f"hparams.{name}", getattr(hparams, name), (), is_not_negative, "a number >= 0")
     require_reading("hparams.initial_weights", hparams.initial_weights, INITIAL_WEIGHTS)

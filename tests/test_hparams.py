@@ -20,6 +20,7 @@ ABOVE_1 = st.floats(1.001, 1e6)
 NO_NUMBERS = st.sampled_from([float("nan"), float("inf"), -float("inf"), "0.5", None, [0.1, 0.2], np.ones(1)])
 NO_SHARE = st.one_of(BELOW_0, ABOVE_1, NO_NUMBERS)
 NOT_POSITIVE = st.one_of(BELOW_0, st.just(0.0), NO_NUMBERS)
+NO_PRIORITY = st.one_of(NOT_POSITIVE, st.floats(1e-40, 0.9e-30))  # beside which powers and their sums vanish
 NEGATIVE = st.one_of(BELOW_0, NO_NUMBERS)
 OUTSIDE = {
     "discount": st.one_of(BELOW_0, st.floats(1.0, 1e6), NO_NUMBERS),
@@ -31,8 +32,8 @@ OUTSIDE = {
     "step_exponent": st.one_of(st.floats(-10, 0.5), ABOVE_1, NO_NUMBERS),
     "step_constant": NO_SHARE,
     "priority_exponent": NO_SHARE,
-    "priority_constant": NOT_POSITIVE,
-    "demonstration_constant": NOT_POSITIVE,
+    "priority_constant": NO_PRIORITY,
+    "demonstration_constant": NO_PRIORITY,
     "importance_start": NO_SHARE,
     "importance_end": NO_SHARE,
     "n_step_weight": NEGATIVE,

@@ -14,7 +14,7 @@ from jrcjax import sum_tree
 
 RADIX = sum_tree.RADIX
 # Below, at and above every size at which a level or a node begins.
-SIZES = [1, 2, 15, 16, 17, 31, 32, 33, 255, 256, 257, 4095, 4096, 4097, 50_000]
+SIZES = [1, 2, 15, 16, 17, 255, 256, 257, 4096, 4097, 50_000]
 # A sum of 16 numbers >= 0, in any order.
 RTOL = 16 * float(np.finfo(np.float32).eps)
 LARGEST_WORD = 2**32 - 1
@@ -94,7 +94,7 @@ def test_every_sum_is_exact_where_it_can_be(leaves):
     drive(leaves, rng, lambda n: rng.integers(0, 256, n).astype(np.float64), rtol=0.0)
 
 
-@settings(max_examples=10, deadline=None, derandomize=True)
+@settings(max_examples=7, deadline=None, derandomize=True)
 @given(leaves=st.one_of(st.integers(1, 5000), st.integers(1, 300)), seed=st.integers(0, 2**32 - 1))
 def test_tree_against_an_array(leaves, seed):
     # Leaves over eleven decades: adjusting sums by differences would leave nothing right of the small ones.
@@ -178,7 +178,7 @@ def test_leaves_of_the_papers_memory_are_drawn_in_proportion_to_their_values():
 
 def test_equal_leaves_are_drawn_uniformly_down_to_the_leaf():
     where = sum_tree.layout(50_000)
-    counts = draws(INIT(jnp.ones(where.leaves), where), where, 1_000_000, 2)
+    counts = draws(INIT(jnp.ones(where.leaves), where), where, 500_000, 2)
     assert chi_square(counts, np.full(where.leaves, 1 / where.leaves)) > ALPHA
 
 

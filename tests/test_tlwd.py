@@ -1,6 +1,5 @@
 """Transfer with demonstrations against a twin of Algorithm 2 in NumPy, double precision, with lists for a memory."""
 
-from collections import deque
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -12,7 +11,7 @@ from backpropagation import Adam, Descent, all_features, assert_same_gradient, b
 from sources import on_device, random_demonstrations, random_source, random_weights
 
 import jrcjax
-from jrcjax import episodes, packing, prioritised_replay, sum_tree
+from jrcjax import episodes, exact, packing, parallel, prioritised_replay, sum_tree
 from jrcjax.hparams import Config, HParams
 from jrcjax.learners import LEARNERS, Source, Spec
 from jrcjax.learners.q_function import QFunction, q_function
@@ -20,6 +19,8 @@ from jrcjax.learners.tlwd import combined_loss, losses, tlwd
 from jrcjax.n_step import NStepTransition
 from jrcjax.prioritised_replay import Sample
 from jrcjax.replay import Transition
+from jrcjax.source import demonstrate
+from jrcjax.value_learning import greedy_policy
 
 SPEC = Spec(shape=(3, 2, 2), num_actions=4, episode_slots=13)
 STATES = 12
@@ -132,9 +133,13 @@ def problem(form="table", hidden=(24, 24), size=64, seed=1, demonstrations=0.5, 
     config, generator = Config(hidden=hidden, form=form), np.random.default_rng([seed, 7])
     batch = random_demonstrations(SPEC, size, seed, scale=3.0)
     return Problem(
-        q_function(SPEC, config), random_weights(SPEC, config, 10 * seed + 1), random_weights(SPEC, config, 10 * seed + 2), batch,
-        generator.uniform(size=size) < demonstrations, generator.uniform(0.05, 1.0, size), hparams_of(**numbers),
-    )  # fmt: skip
+        q_function(SPEC, config),
+        *(random_weights(SPEC, config, 10 * seed + i) for i in (1, 2)),
+        batch,
+        generator.uniform(size=size) < demonstrations,
+        generator.uniform(0.05, 1.0, size),
+        hparams_of(**numbers),
+    )
 
 
 CASES = [
@@ -372,7 +377,8 @@ def test_updates_against_algorithm_2(case):
             assert_same_memory(state.memory, twin)
     # Rounding: as for Algorithm 1, each of the 100 steps adds some 1e-7. The weights move by far more.
     assert_same_layers(layers_of(state.weights), twin.layers, 2e-5)
-    assert all(np.abs(w - f).max() > 1e-2 for pair in zip(twin.layers, start, strict=True) for w, f in zip(*pair))
+    moved = jax.tree.map(lambda w, f: np.abs(w - f).max() > 1e-2, twin.layers, start)
+    assert all(jax.tree.leaves(moved))
     assert len(twin.memory) == config.replay_capacity
 
 
@@ -390,7 +396,10 @@ def test_initial_weights_are_random_as_those_of_ddqn_or_the_sources(form):
     learner, source = tlwd(SPEC, config), random_source(SPEC, config)
     for seed in range(3):
         key = jax.random.key(seed)
-        wanted = (LEARNERS["ddqn"](SPEC, config).init(key, HParams()), LEARNERS["dpr"](SPEC, config).init(key, HParams(), source))
+        wanted = (
+            LEARNERS["ddqn"](SPEC, config).init(key, HParams()),
+            LEARNERS["dpr"](SPEC, config).init(key, HParams(), source),
+        )
         for start, other in enumerate(wanted):
             state = learner.init(key, hparams_of(initial_weights=start), source)
             jax.tree.map(np.testing.assert_array_equal, state.weights, other.weights)
@@ -436,23 +445,24 @@ EVENTS = jnp.asarray([0.1, 0.5, 0.9])
 
 @pytest.fixture(scope="module")
 def one_agent(short_target):
-    """A training as a function of hyperparameters, of the target environment and of the source."""
-    def run(numbers, event_probability, source):
+    """A training as a function of hyperparameters and of the target environment, and the same compiled."""
+    source = random_source(episodes.spec_of(short_target), SMALL)
+
+    def run(numbers, event_probability):
         speed = short_target.speed
         speed = speed.replace(event_probability=jnp.stack([speed.event_probability[0], event_probability]))
         hparams = HParams(epsilon_slots=jnp.float32(30.0), target_period=jnp.int32(7), **numbers)
         params = short_target.replace(speed=speed)
-        return jrcjax.train(jax.random.key(3), params, hparams, learner="tlwd", config=SMALL, source=source)[1]
+        agent, log = jrcjax.train(jax.random.key(3), params, hparams, learner="tlwd", config=SMALL, source=source)
+        return agent.learner.weights, log
 
     return run, jax.jit(run)
 
 
-@pytest.mark.parametrize("over", ["hyperparameters", "target", "source"])
+@pytest.mark.parametrize("over", ["hyperparameters", "target"])
 @pytest.mark.slow
-def test_vmap_is_one_call_after_the_other(over, one_agent, short_target):
-    spec = episodes.spec_of(short_target)
-    sources = jax.tree.map(lambda *leaves: jnp.stack(leaves), *(random_source(spec, SMALL, seed) for seed in range(3)))
-    values = {"hyperparameters": NUMBERS, "target": EVENTS, "source": sources}
+def test_vmap_is_one_call_after_the_other(over, one_agent):
+    values = {"hyperparameters": NUMBERS, "target": EVENTS}
     pick = lambda tree, i: jax.tree.map(lambda leaf: leaf[i], tree)  # noqa: E731
     arguments = [value if name == over else pick(value, 1) for name, value in values.items()]
     run, single = one_agent
@@ -460,7 +470,7 @@ def test_vmap_is_one_call_after_the_other(over, one_agent, short_target):
     for i in range(3):
         alone = single(*(pick(value, i if name == over else 1) for name, value in values.items()))
         jax.tree.map(lambda a, b, i=i: np.testing.assert_allclose(a[i], b, rtol=1e-5, atol=1e-5), together, alone)
-    assert len(np.unique(np.asarray(together.policy_reward)[:, 0])) + len(np.unique(together.reward, axis=0)) > 4
+    assert all(len(np.unique(leaf, axis=0)) == 3 for leaf in jax.tree.leaves(together[0]))
 
 
 # --- What pre-training gives at the paper's sizes ---------------------------------------------------------------------
@@ -470,21 +480,45 @@ def test_vmap_is_one_call_after_the_other(over, one_agent, short_target):
 def test_pretraining_at_the_papers_sizes(source):
     """Eight demonstrators in the source environment, 20,000 of their transitions each, and 10,000 updates on them.
 
-    Where a demonstrator hardly prefers its action the errors of the returns decide and not the margin, so that agents
-    agree with it in every state only if the margin outweighs them. With Table I's weights they are as good as it is.
+    Where a demonstrator hardly prefers its action (its median lead is 1, of values near 400) the errors of the returns
+    decide with Table I's weights, not the margin, and may well put a mistake right: agents are then about as good as
+    the demonstrators, the best reward being 4.44. They agree with them if the margin outweighs the errors.
     """
-    config, hparams = Config(episodes=200), HParams()
+    config, imitating = Config(episodes=200), HParams(margin_weight=jnp.float32(1000.0))
     spec = episodes.spec_of(source)
     learner, function = tlwd(spec, config), q_function(spec, config)
 
     def run(shared, key):
-        env, hparams, strict = shared
-        handed_on, _ = jrcjax.train_source(key, env, hparams, config)
-        policies = [learner.policy(learner.init(jax.random.fold_in(key, 9), each, handed_on)) for each in (hparams, strict)]
-        return greedy_policy(function.table(handed_on.weights)), policies, handed_on.demonstrations.state
+        env, both = shared
+        handed_on, _ = jrcjax.train_source(key, env, both[0], config)
+        pretrained = [learner.init(jax.random.fold_in(key, 9), hparams, handed_on) for hparams in both]
+        policies = [greedy_policy(function.table(handed_on.weights)), *(learner.policy(state) for state in pretrained)]
+        rewards = [exact.evaluate_policy(env, policy).reward for policy in policies]
+        return jnp.stack(policies), jnp.stack(rewards), handed_on.demonstrations.state
 
-    strict = hparams.replace(margin_weight=jnp.float32(1000.0))
     keys = jax.random.split(jax.random.key(0), parallel.padded(8, 4))
-    demonstrator, (plain, strict), visited = parallel.over_agents(run, 4)((source, hparams, strict), keys)
-    visits = np.stack([np.bincount(states, minlength=spec.num_states) for states in np.asarray(visited)]) / visited.shape[1]
-    agreement = (visits * (np.asarray(strict * demonstrator).sum(axis=-1))).sum(axis=1)
+    policies, rewards, visited = map(np.asarray, parallel.over_agents(run, 4)((source, (HParams(), imitating)), keys))
+    demonstrator, _, imitator = policies.swapaxes(0, 1)
+    agree = (demonstrator == imitator).all(axis=-1)
+    shares = np.take_along_axis(agree, visited, axis=1).mean(axis=1)
+    assert (shares >= 0.95).all()
+    # The difference of one agent has a standard deviation of 0.13, that of eight agents' mean one of 0.05.
+    assert rewards[:, 1].mean() >= rewards[:, 0].mean() - 0.15
+
+
+@pytest.mark.slow
+def test_pretraining_on_an_optimal_demonstrator_at_the_papers_sizes(source):
+    """With Table I's weights, pre-training takes over the optimal policy in the states that the demonstrator visits."""
+    config = Config(episodes=1)
+    spec = episodes.spec_of(source)
+    learner, best = tlwd(spec, config), exact.optimal_policy(source)
+
+    def run(env, key):
+        demonstrations = demonstrate(key, best, env, HParams(), config)
+        weights = q_function(spec, config).init(key)
+        state = learner.init(jax.random.fold_in(key, 9), HParams(), Source(weights, demonstrations))
+        return learner.policy(state), demonstrations.state
+
+    policies, visited = map(np.asarray, parallel.over_agents(run, 4)(source, jax.random.split(jax.random.key(1), 8)))
+    agree = (policies == np.asarray(best)).all(axis=-1)
+    assert (np.take_along_axis(agree, visited, axis=1).mean(axis=1) >= 0.95).all()
