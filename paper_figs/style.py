@@ -30,7 +30,7 @@ class Look(NamedTuple):
 # Okabe and Ito's palette, which stays apart for the colour-blind and in grey.
 LOOKS = {
     "tlwd": Look("TLwD", "#D55E00", "o"),
-    "tlwd_uniform": Look("TLwD, uniform replay", "#000000", "x"),
+    "tlwd_uniform": Look("TLwD, uniform", "#000000", "x"),
     "dpr": Look("DPR", "#009E73", "s"),
     "ddqn": Look("DDQN", "#0072B2", "^"),
     "q_learning": Look("Q-learning", "#CC79A7", "D"),
