@@ -10,12 +10,14 @@ import json
 import sys
 from pathlib import Path
 
+import jax
 import jax.numpy as jnp
 import xarray as xr
 
-from jrcjax import exact
-from jrcjax.hparams import HParams
+from jrcjax import exact, parallel
+from jrcjax.hparams import Config, HParams
 from jrcjax.presets import paper_params
+from jrcjax.transfer import transfer
 from paper_figs.__main__ import results_folder
 from paper_figs.claims import TOLERANCE, convergence_episode, first, gaps
 from paper_figs.figures import FIGURES
@@ -100,8 +102,28 @@ def quoted_of_ablation(data: xr.Dataset) -> dict[str, str]:
     }
 
 
+def quoted_of_demonstrations(seeds: int = 16, episodes: int = 300) -> dict[str, str]:
+    """How good TLwD gets in the target with demonstrations from the source, and with demonstrations from the target."""
+    target, config = paper_params("target"), Config(episodes=episodes)
+    optimum = exact.evaluate_policy(target, exact.optimal_policy(target)).reward
+
+    def policy_reward(environments, key):
+        done = transfer(key, *environments, config=config, learners=("tlwd",))
+        return done.logs["tlwd"].policy_reward[episodes // 2 :].mean()
+
+    run = parallel.over_agents(policy_reward)
+    keys = jax.random.split(jax.random.key(0), parallel.padded(seeds))
+    gap = {
+        f"demonstrations from the {name}": 1 - float(run((source, target), keys)[:seeds].mean() / optimum)
+        for name, source in (("source", paper_params("source")), ("target", target))
+    }
+    return {name: f"mean gap in episodes {episodes // 2 + 1} to {episodes} {value:.3g}" for name, value in gap.items()}
+
+
 def main() -> int:
     """Prints the tables and the numbers; returns the exit status."""
+    parallel.use_all_cores()
+    parallel.keep_compiled()
     out = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
     try:
         claims = json.loads((out / "claims.json").read_text())
@@ -115,6 +137,7 @@ def main() -> int:
     sections = {"in the source": quoted_of_source(source), "in the target": quoted_of_target(target)}
     if (folder / "ablation").exists():
         sections["TLwD with parts left out"] = quoted_of_ablation(store.load(folder / "ablation", Size().seeds))
+    sections["TLwD, 16 seeds x 300 episodes"] = quoted_of_demonstrations()
     for title, numbers in sections.items():
         print(f"\n{title}")
         for name, value in numbers.items():

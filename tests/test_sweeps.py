@@ -1,5 +1,6 @@
 """Sweeps end to end at a tiny size: parts on disk, resuming, refusing, and agreement with single runs."""
 
+import contextlib
 import io
 import json
 from dataclasses import replace
@@ -125,7 +126,9 @@ def test_chunks_divide_the_episodes(episodes, chunk):
     assert chunk_of(episodes) == chunk
 
 
-def test_the_program_is_compiled_once_for_all_blocks(tmp_path):
+@contextlib.contextmanager
+def compilations():
+    """Names of the functions that are compiled."""
     compiled = []
 
     def listen(event, duration, **about):
@@ -134,10 +137,15 @@ def test_the_program_is_compiled_once_for_all_blocks(tmp_path):
 
     jax.monitoring.register_event_duration_secs_listener(listen)
     try:
-        # Three blocks, with a number of episodes that no other test uses, so that nothing is compiled yet.
-        run_sweep(FIG5A, Size(seeds=2 * SEEDS_PER_PART + 1, episodes=3), tmp_path, QUIET, resume=False)
+        yield compiled
     finally:
         jax.monitoring.unregister_event_duration_listener(listen)
+
+
+def test_the_program_is_compiled_once_for_all_blocks(tmp_path):
+    with compilations() as compiled:
+        # Three blocks, with a number of episodes that no other test uses, so that nothing is compiled yet.
+        run_sweep(FIG5A, Size(seeds=2 * SEEDS_PER_PART + 1, episodes=3), tmp_path, QUIET, resume=False)
     assert compiled.count("jit(checked)") == 2  # one program starts the agents, one advances them
 
 
@@ -259,18 +267,9 @@ def test_hyperparameters_of_points_are_part_of_the_configuration():
 
 
 def test_a_transfer_sweep_compiles_once_for_all_blocks(tmp_path):
-    compiled = []
-
-    def listen(event, duration, **about):
-        if event == "/jax/core/compile/backend_compile_duration":
-            compiled.append(about.get("fun_name"))
-
-    jax.monitoring.register_event_duration_secs_listener(listen)
-    try:
-        size = replace(TINY, seeds=2 * SEEDS_PER_PART, episodes=1, pretraining=3)
+    size = replace(TINY, seeds=2 * SEEDS_PER_PART, episodes=1, pretraining=3)
+    with compilations() as compiled:
         run_sweep(replace(PAIR, learners=("tlwd", "dpr")), size, tmp_path, QUIET, resume=False)
-    finally:
-        jax.monitoring.unregister_event_duration_listener(listen)
     # Source agents start, advance and demonstrate; the sweep's agents start and advance.
     assert compiled.count("jit(checked)") == 5
 
