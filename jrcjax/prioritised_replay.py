@@ -114,5 +114,5 @@ def set_priorities(memory: Memory, indices: Int, priorities: Float, exponent: Fl
 
 def importance_weights(probability: Float, size: Int, exponent: Float) -> Float:
     """w_i = (1 / (|D_re| P(i)))^beta, equation (24), divided by the largest of the batch [B]."""
-    log_weights = -exponent * jnp.log(size * probability)
+    log_weights = -exponent * jnp.log(jnp.asarray(size, jnp.float32) * probability)
     return jnp.exp(log_weights - log_weights.max())

@@ -120,7 +120,7 @@ def _descend(tree: Float, node: Int, value: Float, levels: range, words: Words, 
         reached = value
         for k in range(1, RADIX):
             beyond = (rest >= reached) & (children[:, k] > 0)  # rounding must not lead past the last positive child
-            child = child + beyond
+            child = child + beyond.astype(child.dtype)
             below = jnp.where(beyond, reached, below)
             value = jnp.where(beyond, children[:, k], value)
             reached = reached + children[:, k]

@@ -310,8 +310,9 @@ def test_the_expected_time_grows_with_the_work_and_is_nothing_for_nothing(tmp_pa
     assert expected_seconds([], Size(), tmp_path) == 0
 
 
-def test_the_expected_time_is_told_before_and_counts_what_is_there(folder):
+def test_the_expected_time_is_told_before_and_counts_what_is_there(tmp_path):
     console = Console(record=True, width=200, file=io.StringIO())
-    run_sweep(FIG5A, Size(seeds=6, episodes=2), folder.parent, console, resume=True)
+    run_sweep(FIG5A, Size(seeds=2, episodes=2), tmp_path, QUIET, resume=False)
+    run_sweep(FIG5A, Size(seeds=3, episodes=2), tmp_path, console, resume=True)
     assert "fig5a: 3 agents (points x seeds x learners), 2 episodes each; expected 0 s" in console.export_text()
-    assert expected_seconds([FIG5A], Size(seeds=6, episodes=2), folder.parent) == 0
+    assert expected_seconds([FIG5A], Size(seeds=3, episodes=2), tmp_path) == 0
