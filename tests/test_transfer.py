@@ -176,7 +176,6 @@ def test_dpr_explores_as_ddqn_does():
     np.testing.assert_array_equal(act(learner)(*arguments), act(ddqn)(*arguments))
 
 
-@pytest.mark.xfail(reason="the optimiser's state is made of the random weights that are then replaced", strict=True)
 @pytest.mark.parametrize("learner", ["dpr"])
 def test_optimisers_that_remember_weights_start_from_the_sources(learner):
     remembering = optax.GradientTransformation(lambda weights: weights, lambda g, state, weights=None: (g, state))

@@ -80,6 +80,10 @@ def dpr(spec: Spec, config: Config) -> Learner:
     def init(key, hparams: HParams, source: Source | None = None) -> DDQNState:
         assert source is not None
         state = from_scratch.init(key, hparams, None)
-        return state._replace(weights=source.weights, target=function.target_of(source.weights))
+        return state._replace(
+            weights=source.weights,
+            target=function.target_of(source.weights),
+            optimiser=optimiser_of(config).init(source.weights),
+        )
 
     return from_scratch._replace(init=init, needs_source=True)
