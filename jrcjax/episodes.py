@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jrcjax import exploration, metrics, slot
+from jrcjax import exploration, metrics, rng, slot
 from jrcjax.exact import evaluate_policy
 from jrcjax.hparams import Config, HParams
 from jrcjax.learners import Learner, LearnerFactory, Source, Spec, make_learner
@@ -100,7 +100,7 @@ def run_episode(
     slots = env_params.max_steps_in_episode
     num_words = slot.NUM_WORDS + max(learner.num_words, exploration.NUM_WORDS)
     key = jax.random.fold_in(jax.random.fold_in(agent.key, _EPISODES), episode)
-    words = jax.random.bits(key, (slots + 1, num_words), jnp.uint32)
+    words = rng.bits(key, (slots + 1, num_words))
 
     def one_slot(carry, xs):
         words, i = xs

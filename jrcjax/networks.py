@@ -1,49 +1,76 @@
 """The Q-network: fully connected, ReLU, one column per state.
 
-Columns instead of rows, because a batched product of weights [out, in] with activations [in, S] runs about
-twice as fast in XLA on a CPU as activations [S, in] with weights [in, out].
+Products of many small matrices are most of the work of training, and XLA on a CPU is far from equally fast at all of
+them. Columns instead of rows, and the derivative below instead of the automatic one, take the fast forms; the values
+are the same up to rounding. `benchmarks/README.md` has the gains.
 """
 
 from __future__ import annotations
 
+import functools
+from typing import Any
+
 import jax
+import jax.numpy as jnp
 from flax import linen as nn
 
 from jrcjax.types import Float
 
-
-@jax.custom_vjp
-def product(kernel: Float, x: Float) -> Float:
-    """The product W x of [out, in] and [in, S], with the ordinary derivative in a faster form."""
-    return kernel @ x
+_SHORT = 8  # sums of at most so many products are added up in one loop, which XLA joins with what surrounds it
 
 
-def _product_forward(kernel: Float, x: Float) -> tuple[Float, tuple[Float, Float]]:
-    return kernel @ x, (kernel, x)
+def product(a: Float, b: Float) -> Float:
+    """The matrix product of [n, k] and [k, m], written out for short sums."""
+    return _added_up(a, b) if a.shape[1] <= _SHORT else a @ b
 
 
-def _product_backward(saved: tuple[Float, Float], gradient: Float) -> tuple[Float, Float]:
-    kernel, x = saved
-    # Without the barrier XLA multiplies with a transposed left operand, for which its CPU products are about three
-    # times slower; copying the transposed kernel first makes a whole training step 15 to 25 % faster.
-    transposed = jax.lax.optimization_barrier(kernel.T)
-    return gradient @ x.T, transposed @ gradient
+def _added_up(a: Float, b: Float) -> Float:
+    return sum((a[:, k, None] * b[k] for k in range(1, a.shape[1])), a[:, 0, None] * b[0])
 
 
-product.defvjp(_product_forward, _product_backward)
+@functools.partial(jax.custom_vjp, nondiff_argnums=(3,))
+def dense(kernel: Float, bias: Float, x: Float, relu: bool) -> Float:
+    """W x + b for columns x, [in, S] to [out, S], rectified if `relu`."""
+    y = product(kernel, x) + bias[:, None]
+    return jnp.maximum(y, 0.0) if relu else y
+
+
+def _dense_forward(kernel: Float, bias: Float, x: Float, relu: bool) -> tuple[Float, tuple[Float, Float, Float]]:
+    y: Any = dense(kernel, bias, x, relu)
+    return y, (kernel, x, y)
+
+
+def _dense_backward(relu: bool, saved: tuple[Float, Float, Float], gradient: Float) -> tuple[Float, Float, Float]:
+    kernel, x, y = saved
+    if relu:
+        gradient = jnp.where(y > 0, gradient, 0.0)
+    # Barriers keep XLA from taking transposed operands into its products, which makes them two to three times slower.
+    barrier = jax.lax.optimization_barrier
+    if x.shape[0] <= _SHORT:  # the bias is the weight of an input that is always 1
+        inputs = jnp.concatenate([x, jnp.ones((1, x.shape[1]))])
+        of_all = gradient @ barrier(inputs.T)
+        of_kernel, of_bias = of_all[:, :-1], of_all[:, -1]
+    else:
+        of_kernel, of_bias = gradient @ barrier(x.T), gradient.sum(axis=1)
+    of_x = product(kernel.T, gradient) if kernel.shape[0] <= _SHORT else barrier(kernel.T) @ gradient
+    return of_kernel, of_bias, of_x
+
+
+dense.defvjp(_dense_forward, _dense_backward)
 
 
 class ColumnDense(nn.Module):
-    """W x + b for columns x."""
+    """A layer of `dense`."""
 
     features: int
+    relu: bool
 
     @nn.compact
     def __call__(self, x: Float) -> Float:
         """[in, S] to [features, S]."""
         kernel = self.param("kernel", nn.initializers.lecun_normal(1, 0), (self.features, x.shape[0]))
         bias = self.param("bias", nn.initializers.zeros, (self.features,))
-        return product(kernel, x) + bias[:, None]
+        return dense(kernel, bias, x, self.relu)
 
 
 class QNetwork(nn.Module):
@@ -57,5 +84,5 @@ class QNetwork(nn.Module):
         """[F, S] to [A, S]."""
         x = features
         for width in self.hidden:
-            x = nn.relu(ColumnDense(width)(x))
-        return ColumnDense(self.num_actions)(x)
+            x = ColumnDense(width, relu=True)(x)
+        return ColumnDense(self.num_actions, relu=False)(x)

@@ -6,9 +6,36 @@ inside the innermost loop costs more on a CPU than the environment does.
 
 from __future__ import annotations
 
+import math
+
+import jax
 import jax.numpy as jnp
 
-from jrcjax.types import Float, Int, Words
+from jrcjax.types import Float, Int, Key, Words
+
+_ROTATIONS = ((13, 15, 26, 6), (17, 29, 16, 24))
+
+
+def bits(key: Key, shape: tuple[int, ...]) -> Words:
+    """What `jax.random.bits(key, shape, uint32)` returns: Threefry-2x32 with 20 rounds, counters in row-major order.
+
+    On a CPU JAX runs through all words once in every round, through memory; here each word is computed in one go, three
+    to four times faster for an episode's words.
+    """
+    data = jax.random.key_data(key)
+    if data.shape != (2,):  # another generator
+        return jax.random.bits(key, shape, jnp.uint32)
+    first, second = data
+    keys = (first, second, first ^ second ^ jnp.uint32(0x1BD11BDA))
+    x = jnp.broadcast_to(first, shape)
+    y = jnp.arange(math.prod(shape), dtype=jnp.uint32).reshape(shape) + second
+    for i in range(5):
+        for rotation in _ROTATIONS[i % 2]:
+            x = x + y
+            y = ((y << rotation) | (y >> (32 - rotation))) ^ x
+        x = x + keys[(i + 1) % 3]
+        y = y + keys[(i + 2) % 3] + jnp.uint32(i + 1)
+    return x ^ y
 
 
 def uniform(words: Words) -> Float:

@@ -7,6 +7,8 @@ can't pile up, however many updates there are.
 
 from __future__ import annotations
 
+import functools
+import operator
 from typing import NamedTuple
 
 import jax
@@ -58,7 +60,12 @@ def leaves(tree: Float, indices: Int) -> Float:
 
 def total(tree: Float) -> Float:
     """Sum of all leaves."""
-    return tree[-1].sum()
+    return _sum(tree[-1])
+
+
+def _sum(rows: Float) -> Float:
+    """Sums of rows [..., RADIX], written out so that XLA joins them with the look-up of the rows."""
+    return functools.reduce(operator.add, (rows[..., k] for k in range(RADIX)))
 
 
 def update(tree: Float, indices: Int, values: Float, where: Layout) -> Float:
@@ -70,7 +77,7 @@ def update(tree: Float, indices: Int, values: Float, where: Layout) -> Float:
     for first_node in where.first_node:
         node = first_node + indices // RADIX
         tree = tree.at[node, indices % RADIX].set(values, mode="promise_in_bounds")
-        values = tree.at[node].get(mode="promise_in_bounds").sum(axis=-1)
+        values = _sum(tree.at[node].get(mode="promise_in_bounds"))
         indices = indices // RADIX
     return tree
 
@@ -85,7 +92,7 @@ def update_one(tree: Float, index: Int, value: Float, where: Layout) -> Float:
     rows = []
     for children in tree.at[path].get(mode="promise_in_bounds"):
         rows.append(jnp.where(jnp.arange(RADIX) == index % RADIX, value, children))
-        index, value = index // RADIX, rows[-1].sum()
+        index, value = index // RADIX, _sum(rows[-1])
     return tree.at[path].set(jnp.stack(rows), mode="promise_in_bounds")
 
 

@@ -14,12 +14,15 @@ import jax.numpy as jnp
 from jrcjax.types import Float, Int
 
 
-def double_q_value(q_online: Float, q_target: Float) -> Float:
-    """Q(s', argmax_a Q(s', a; theta); theta'), the value in equation (15); [N, A], [N, A] to [N]."""
+def double_q_value(q_online: Float, q_target: Float, axis: int = 1) -> Float:
+    """Q(s', argmax_a Q(s', a; theta); theta'), the value in equation (15); [N, A], [N, A] to [N].
+
+    With actions along the other axis: `axis` 0.
+    """
     chex.assert_equal_shape([q_online, q_target])
     chex.assert_rank(q_online, 2)
-    best = jnp.argmax(q_online, axis=-1, keepdims=True)
-    return jnp.take_along_axis(q_target, best, axis=-1)[..., 0]
+    best = jnp.argmax(q_online, axis=axis, keepdims=True)
+    return jnp.take_along_axis(q_target, best, axis=axis).squeeze(axis)
 
 
 def td_target(reward: Float, discount: Float, next_value: Float) -> Float:

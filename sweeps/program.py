@@ -32,7 +32,8 @@ class Progress(NamedTuple):
     log: dict[str, Log]
     """By learner: [points, seeds, episodes] each."""
     agents: dict[str, AgentState]
-    """By learner, after the chunk; the leading axis of every leaf is lanes, of which the first points x seeds count."""
+    """By learner, after the chunk, gone with the next; the leading axis of every leaf is lanes, of which the first
+    points x seeds count."""
 
 
 class Points(NamedTuple):
@@ -91,7 +92,8 @@ class Program(NamedTuple):
     start: Callable
     """(points, (keys, sources, points' numbers)) to the agents of all learners before their first episode."""
     advance: Callable
-    """((points, number of the first episode), (agents, points' numbers)) to the agents a chunk later, and their log."""
+    """((points, number of the first episode), lanes = (agents, points' numbers)) to the lanes a chunk later, which take
+    the memory of the old ones, and their log."""
 
 
 @functools.cache
@@ -115,9 +117,10 @@ def program_of(learners: tuple[str, ...], spec: Spec, config: Config, chunk: int
         agents, point = lane
         params, hparams = at(points, point)
         done = {n: run_episodes(agents[n], first, chunk, params, hparams, rule) for n, rule in rules.items()}
-        return {n: agent for n, (agent, _) in done.items()}, {n: log for n, (_, log) in done.items()}
+        agents, logs = ({n: of_learner[i] for n, of_learner in done.items()} for i in (0, 1))
+        return (agents, point), logs
 
-    return Program(parallel.over_agents(start), parallel.over_agents(advance))
+    return Program(parallel.over_agents(start), parallel.over_agents(advance, in_place=True))
 
 
 def keys_of(seeds: np.ndarray) -> Key:
@@ -149,8 +152,8 @@ def run_block(sweep: Sweep, size: Size, points: Points, seeds: range, source: So
         keys = jax.vmap(target_key)(keys)
     of_lane: Any = jax.tree.map(lambda leaf: leaf[seed], source)
     where = parallel.pad_agents(jnp.asarray(point), lanes)
-    agents = program.start(points, (*parallel.pad_agents((keys, of_lane), lanes), where))
+    state = program.start(points, (*parallel.pad_agents((keys, of_lane), lanes), where)), where
     for first in range(0, size.episodes, chunk):
-        agents, log = program.advance((points, jnp.int32(first)), (agents, where))
+        state, log = program.advance((points, jnp.int32(first)), state)
         unpadded = jax.tree.map(lambda a: np.asarray(a[: math.prod(shape)]).reshape(*shape, chunk), log)
-        yield Progress(chunk, unpadded, agents)
+        yield Progress(chunk, unpadded, state[0])

@@ -1,5 +1,7 @@
 """Double DQN against a twin of Algorithm 1 written in NumPy, double precision, with backpropagation by hand."""
 
+import functools
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -173,7 +175,7 @@ def test_values_are_columns_of_features_in_order_of_ids(form):
     close = {"rtol": 1e-5, "atol": 1e-5}
     np.testing.assert_allclose(function.table(online), wanted, **close)
     some, actions = jnp.asarray([5, 0, 11]), jnp.asarray([3, 0, 1])
-    np.testing.assert_allclose(function.values(online, some), wanted[some], **close)
+    np.testing.assert_allclose(function.columns(online, some).T, wanted[some], **close)
     np.testing.assert_allclose(function.of_states(online, some), wanted[some], **close)
     np.testing.assert_allclose(function.of_state(online, jnp.int32(5)), wanted[5], **close)
     np.testing.assert_allclose(function.chosen(online, some, actions), wanted[some, actions], **close)
@@ -239,9 +241,10 @@ def test_target_is_copied_after_every_period_updates_and_never_else(form, period
     for i, state in enumerate(states[1:]):
         # Update i used the weights as they were after the last multiple of `period` updates before it.
         wanted = as_target(states[i - i % period].weights)
-        jax.tree.map(np.testing.assert_array_equal, state.target, wanted)
+        # The table is rounded as the program around it has it; a step of Adam's moves it by some thousandths.
+        jax.tree.map(functools.partial(np.testing.assert_allclose, rtol=0, atol=2e-6), state.target, wanted)
         newer = as_target(states[i + 1].weights)
-        assert any(jax.tree.leaves(jax.tree.map(lambda a, b: bool((a != b).any()), newer, wanted)))
+        assert any(jax.tree.leaves(jax.tree.map(lambda a, b: bool((abs(a - b) > 1e-4).any()), newer, wanted)))
 
 
 def test_an_optimiser_of_ones_own_brings_its_rate():

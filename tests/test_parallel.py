@@ -93,3 +93,14 @@ def test_numbers_do_not_depend_on_how_many_agents_train(logs):
 
 def test_agents_with_different_keys_differ(logs):
     assert len(np.unique(np.asarray(logs[2].reward), axis=0)) == 3 * UNIT
+
+
+def test_in_place_gives_the_same_agents_and_results():
+    def one(step, agent):
+        return {name: leaf + step for name, leaf in agent.items()}, agent["a"].sum()
+
+    agents = {"a": jnp.arange(6.0 * UNIT).reshape(3 * UNIT, 2), "b": jnp.arange(3 * UNIT)}
+    wanted = parallel.over_agents(one)(jnp.int32(5), agents)
+    got = parallel.over_agents(one, in_place=True)(jnp.int32(5), jax.tree.map(jnp.copy, agents))
+    jax.tree.map(np.testing.assert_array_equal, got, wanted)
+    np.testing.assert_array_equal(got[0]["b"], np.arange(3 * UNIT) + 5)

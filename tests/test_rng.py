@@ -56,3 +56,15 @@ def test_uniform_reaches_0_but_never_1():
     assert u.dtype == jnp.float32
     assert float(u[0]) == 0.0
     assert float(u[1]) == 1.0 - 2.0**-24 < 1.0
+
+
+@pytest.mark.parametrize("shape", [(), (1,), (7,), (300, 73)])
+def test_bits_are_those_of_jax(shape):
+    keys = jax.random.split(jax.random.key(3), 5)
+    wanted = jax.vmap(lambda key: jax.random.bits(key, shape, jnp.uint32))(keys)
+    np.testing.assert_array_equal(jax.vmap(lambda key: rng.bits(key, shape))(keys), wanted)
+
+
+def test_bits_of_another_generator():
+    key = jax.random.key(3, impl="rbg")
+    np.testing.assert_array_equal(rng.bits(key, (9,)), jax.random.bits(key, (9,), jnp.uint32))

@@ -360,7 +360,7 @@ def test_updates_against_algorithm_2(case):
         twin.pretrain(jax.random.bits(jax.random.fold_in(jax.random.fold_in(key, 1), i), (2, 8), jnp.uint32))
     assert_same_layers(layers_of(state.weights), twin.layers, 2e-5)
     target = forward(twin.target, FEATURES)[-1].T
-    kept = state.target if config.uses_table(STATES) else function.table(state.target)
+    kept = state.target.T if config.uses_table(STATES) else function.table(state.target)
     np.testing.assert_allclose(kept, target, rtol=0, atol=1e-4)
     assert_same_memory(state.memory, twin)
 

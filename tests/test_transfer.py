@@ -157,7 +157,7 @@ def test_dpr_starts_from_the_sources_weights_and_nothing_else(form):
     jax.tree.map(np.testing.assert_array_equal, state.weights, source.weights)
     table = forward(layers_of(source.weights), all_features(SPEC.shape))[-1].T
     if form == "table":
-        np.testing.assert_allclose(state.target, table, rtol=1e-5, atol=1e-5)
+        np.testing.assert_allclose(state.target.T, table, rtol=1e-5, atol=1e-5)
     else:
         jax.tree.map(np.testing.assert_array_equal, state.target, source.weights)
     jax.tree.map(np.testing.assert_array_equal, state.optimiser, fresh.optimiser)

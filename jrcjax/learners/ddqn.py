@@ -24,7 +24,7 @@ class DDQNState(NamedTuple):
     weights: Any
     """theta."""
     target: Any
-    """theta' as its table [S, A], or as weights in the mini-batch form."""
+    """theta' as its table [A, S], or as weights in the mini-batch form."""
     optimiser: Any
     ring: Words
     """[capacity, words] replay memory."""

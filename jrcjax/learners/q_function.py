@@ -1,7 +1,8 @@
 """The network of one problem as a function of weights and state ids, on all states at once or on rows of a batch.
 
 With few states the network is evaluated once per slot on all of them. The table serves the action, the target and
-the loss; the target network is then a copy of its table, since its weights are used for nothing else.
+the loss; the target network is then a copy of its table, since its weights are used for nothing else. Inside, tables
+have one column per state, [A, S], as the network computes them.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from jrcjax import states
 from jrcjax.hparams import Config
@@ -31,46 +33,48 @@ class QFunction(NamedTuple):
         """Random weights."""
         return self.network.init(key, jnp.zeros((len(self.shape), 1)))
 
-    def values(self, weights: Any, ids: Int) -> Float:
-        """Q(s, .; theta) of states [N], [N, A]."""
-        return self.network.apply(weights, states.features_of(ids, self.shape).T).T  # pyright: ignore
+    def columns(self, weights: Any, ids: Int | np.ndarray | None = None) -> Float:
+        """Q(s, .; theta) of states [N], [A, N]; of all states if there are no ids."""
+        # A constant of NumPy, so that XLA sees that all calls compute the same and does it once.
+        ids = np.arange(states.num_states(self.shape)) if ids is None else ids
+        return self.network.apply(weights, states.features_of(ids, self.shape).T)  # pyright: ignore
 
     def table(self, weights: Any) -> Float:
         """Q(s, .; theta) of all states, [S, A]."""
-        return self.values(weights, jnp.arange(states.num_states(self.shape)))
+        return self.columns(weights).T
 
     def of_state(self, weights: Any, state: Int) -> Float:
         """Q(s, .; theta) of one state, [A]."""
-        return self.table(weights)[state] if self.as_table else self.values(weights, state[None])[0]
+        return self.columns(weights)[:, state] if self.as_table else self.columns(weights, state[None])[:, 0]
 
     def target_of(self, weights: Any) -> Any:
-        """The target network that is kept: its table [S, A], or its weights."""
-        return self.table(weights) if self.as_table else weights
+        """The target network that is kept: its table [A, S], or its weights."""
+        return self.columns(weights) if self.as_table else weights
 
     def chosen(self, weights: Any, ids: Int, actions: Int) -> Float:
         """Q(s, a; theta) of a batch of states and actions, [B]."""
         if self.as_table:
-            return self.table(weights).at[ids, actions].get(mode="promise_in_bounds")
-        return jnp.take_along_axis(self.values(weights, ids), actions[:, None], axis=1)[:, 0]
+            return self.columns(weights).at[actions, ids].get(mode="promise_in_bounds")
+        return jnp.take_along_axis(self.columns(weights, ids), actions[None], axis=0)[0]
 
     def of_states(self, weights: Any, ids: Int) -> Float:
         """Q(s, .; theta) of a batch of states, [B, A]."""
         if self.as_table:
             return self.table(weights).at[ids].get(mode="promise_in_bounds")
-        return self.values(weights, ids)
+        return self.columns(weights, ids).T
 
     def double_q(self, weights: Any, target: Any, ids: Int) -> Float:
         """Q(s', argmax_a Q(s', a; theta); theta') of a batch of next states, [B]; no gradient flows through it."""
         frozen = jax.lax.stop_gradient(weights)
         if self.as_table:
-            return double_q_value(self.table(frozen), target).at[ids].get(mode="promise_in_bounds")
-        return double_q_value(self.values(frozen, ids), self.values(target, ids))
+            return double_q_value(self.columns(frozen), target, axis=0).at[ids].get(mode="promise_in_bounds")
+        return double_q_value(self.columns(frozen, ids), self.columns(target, ids), axis=0)
 
     def greatest(self, target: Any, ids: Int) -> Float:
         """max_a Q(s, a; theta') of a batch of states, [B]."""
         if self.as_table:
-            return target.max(axis=-1).at[ids].get(mode="promise_in_bounds")
-        return self.values(target, ids).max(axis=-1)
+            return target.max(axis=0).at[ids].get(mode="promise_in_bounds")
+        return self.columns(target, ids).max(axis=0)
 
 
 def q_function(spec: Spec, config: Config) -> QFunction:

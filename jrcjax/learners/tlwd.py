@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 import optax
 
-from jrcjax import exploration, n_step, prioritised_replay, states
+from jrcjax import exploration, n_step, prioritised_replay, rng, states
 from jrcjax.checks import refuse
 from jrcjax.hparams import Config, HParams, optimiser_of
 from jrcjax.learners.base import Learner, Source, Spec
@@ -32,7 +32,7 @@ class TLwDState(NamedTuple):
     weights: Any
     """theta."""
     target: Any
-    """theta' as its table [S, A], or as weights in the mini-batch form."""
+    """theta' as its table [A, S], or as weights in the mini-batch form."""
     optimiser: Any
     memory: Memory
     window: NStepTransition
@@ -115,7 +115,7 @@ def tlwd(spec: Spec, config: Config) -> Learner:
 
         def one(state, i):
             shape = (prioritised_replay.NUM_WORDS, config.batch_size)
-            words = jax.random.bits(jax.random.fold_in(key, i), shape, jnp.uint32)
+            words = rng.bits(jax.random.fold_in(key, i), shape)
             return learn(state, words, jnp.int32(0), i, copied(state, i, hparams), hparams), None
 
         state, _ = jax.lax.scan(one, state, jnp.arange(config.pretraining))

@@ -1,0 +1,167 @@
+"""Times cases side by side: each in a process of its own, all made ready first, then one repetition of each in turn.
+
+Other work on a shared machine then slows all cases alike, and ratios of one run mean something.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import resource
+import statistics
+import time
+from collections.abc import Callable, Iterable
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass
+from multiprocessing.connection import Connection
+from typing import Any, NamedTuple
+
+
+class Ready(NamedTuple):
+    """A case that is compiled."""
+
+    advance: Callable[[], Any]
+    """Advances all agents by the steps of one repetition and waits for the result."""
+    compile_s: float
+    """Tracing and compiling, with no cache on disk."""
+
+
+class Case(NamedTuple):
+    """What is timed."""
+
+    name: str
+    setup: Callable[[int, int], Ready]
+    """(agents, steps of one repetition) to the compiled case; a function of a module, since it runs elsewhere."""
+    agents: int
+    """In each process."""
+    steps: int
+    """Of each agent in one repetition."""
+    processes: int = 1
+    """That run at the same time."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """One measured case."""
+
+    case: str
+    agents: int
+    us_per_agent_step: float
+    """Median over repetitions: wall time / (agents x steps)."""
+    us_low: float
+    us_high: float
+    compile_s: float
+    """Tracing and compiling, with no cache on disk."""
+    peak_rss_mb: float
+    """Largest resident memory, of all processes of the case."""
+    steps_per_agent: int
+    """In one repetition."""
+    repetitions: int
+
+    @property
+    def us(self) -> str:
+        """Median and range, for a table."""
+        return f"{_digits(self.us_per_agent_step):>10s}  ({_digits(self.us_low)}-{_digits(self.us_high)})"
+
+
+class NotInstalled(Exception):
+    """A case needs a package that is not there."""
+
+
+def _digits(value: float) -> str:
+    return f"{value:.3f}" if value < 1 else f"{value:.2f}" if value < 100 else f"{value:.0f}"
+
+
+def _serve(pipe: Connection, case: Case) -> None:
+    """In a process of its own: gets the case ready, then times a repetition whenever it is asked to."""
+    try:
+        ready = case.setup(case.agents, case.steps)
+    except ModuleNotFoundError as error:
+        pipe.send(str(error.name))
+        return
+    ready.advance()
+    pipe.send(ready.compile_s)
+    while pipe.recv():
+        begin = time.perf_counter()
+        ready.advance()
+        seconds = time.perf_counter() - begin
+        pipe.send((seconds, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024))
+
+
+class Running:
+    """A case in its processes."""
+
+    def __init__(self, case: Case):
+        """Waits until the case is compiled and warmed up; raises NotInstalled."""
+        self.case = case
+        self._repetitions: list[float] = []
+        self._peaks: list[float] = []
+        context = multiprocessing.get_context("spawn")
+        self._pipes, self._processes = [], []
+        for _ in range(case.processes):
+            ours, theirs = context.Pipe()
+            self._processes.append(context.Process(target=_serve, args=(theirs, case), daemon=True))
+            self._processes[-1].start()
+            theirs.close()
+            self._pipes.append(ours)
+        answers = [pipe.recv() for pipe in self._pipes]
+        if isinstance(answers[0], str):
+            raise NotInstalled(answers[0])
+        self._compile_s = max(answers)
+
+    def repeat(self) -> None:
+        """Times one repetition."""
+        for pipe in self._pipes:
+            pipe.send(True)
+        answers = [pipe.recv() for pipe in self._pipes]
+        steps = self.case.agents * self.case.processes * self.case.steps
+        self._repetitions.append(max(seconds for seconds, _ in answers) / steps * 1e6)
+        self._peaks = [peak for _, peak in answers]
+
+    def result(self) -> Result:
+        """What was measured so far."""
+        us = self._repetitions
+        agents = self.case.agents * self.case.processes
+        return Result(
+            self.case.name,
+            agents,
+            statistics.median(us),
+            min(us),
+            max(us),
+            self._compile_s,
+            sum(self._peaks),
+            self.case.steps,
+            len(us),
+        )
+
+    def stop(self) -> None:
+        """Ends the processes."""
+        for process in self._processes:
+            process.kill()
+            process.join()
+
+
+def in_turns(cases: Iterable[Case], repetitions: int) -> tuple[list[Result], dict[str, str]]:
+    """Results of the cases, and those that could not run with the package that they lack."""
+    with ExitStack() as stack:
+        running, lacking = [], {}
+        for case in cases:
+            try:
+                running.append(Running(case))
+            except NotInstalled as error:
+                lacking[case.name] = str(error)
+                continue
+            stack.callback(running[-1].stop)
+        for _ in range(repetitions):
+            for one in running:
+                one.repeat()
+        return [one.result() for one in running], lacking
+
+
+def alone(case: Case, repetitions: int) -> Result:
+    """The result of one case."""
+    return in_turns([case], repetitions)[0][0]
+
+
+def as_json(results: list[Result]) -> list[dict[str, Any]]:
+    """Results as the JSON file has them."""
+    return [asdict(result) for result in results]
