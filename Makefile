@@ -7,6 +7,7 @@ ARGS ?=
 VENV := .venv
 PY := $(VENV)/bin/python
 STAMP := $(VENV)/.stamp
+PEERS_STAMP := $(VENV)/.peers
 
 .DEFAULT_GOAL := help
 .PHONY: setup figures test bench sweeps lint types lock-check lock clean help
@@ -43,8 +44,21 @@ figures: $(STAMP)  ## draw the paper's figures
 test: $(STAMP)  ## run the tests
 	$(PY) -m pytest $(ARGS)
 
-bench: $(STAMP)  ## time the code
+bench: $(STAMP) $(PEERS_STAMP)  ## time the code, beside its peers
 	$(PY) -m benchmarks $(ARGS)
+
+# The peers come on top of the locked packages, whose versions they leave alone. The PyTorch is pinned here: of the
+# releases that the peers allow, installers would take the newest.
+$(PEERS_STAMP): $(STAMP)
+	@echo "installing the benchmarks' peers into $(VENV) (some minutes)"
+	@set -e; \
+	sed -e '/^ *--hash/d' -e 's/ *\\$$//' requirements.lock > $(VENV)/constraints.txt; \
+	$(PY) -m pip --version >/dev/null 2>&1 || $(PY) -m ensurepip >/dev/null; \
+	$(PY) -m pip install --disable-pip-version-check --quiet --no-compile --constraint $(VENV)/constraints.txt \
+	  torch==2.13.0; \
+	$(PY) -m pip install --disable-pip-version-check --quiet --no-compile --constraint $(VENV)/constraints.txt \
+	  --no-build-isolation --editable '.[peers]'
+	@touch $@
 
 sweeps: $(STAMP)  ## run parameter sweeps
 	$(PY) -m sweeps $(ARGS)

@@ -2,33 +2,33 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import sys
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
 
 import tyro
 
-NAMES = ("throughput", "sum_tree")
+NAMES = ("throughput", "scaling", "limit", "canary", "start", "sum_tree", "paper")
 
 
 @dataclass(frozen=True)
 class Options:
-    """Measures speed and memory on this machine."""
+    """Measures speed and memory on this machine, each benchmark against the claim at the top of its file."""
 
     names: Annotated[tuple[str, ...], tyro.conf.Positional] = ()
-    """Benchmarks to run: throughput, sum_tree. Default: all."""
+    """Benchmarks to run: throughput, scaling, limit, canary, start, sum_tree, paper. Default: throughput."""
     json: Path | None = None
     """File for machine and results."""
     quick: bool = False
-    """Shorter runs, two minutes in all."""
+    """Shorter runs: two minutes for throughput."""
 
 
 def main(args: list[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     options = tyro.cli(Options, prog="python -m benchmarks", args=args)
-    from benchmarks import sum_tree, throughput
     from jrcjax.provenance import machine, versions
 
     unknown = [name for name in options.names if name not in NAMES]
@@ -38,11 +38,13 @@ def main(args: list[str] | None = None) -> int:
     if options.json is not None and not options.json.parent.is_dir():
         print(f"error: json: {str(options.json)!r}; allowed: a file in an existing folder", file=sys.stderr)
         return 2
-    chosen = options.names or NAMES
-    results = throughput.run(options.quick) if "throughput" in chosen else []
-    results += sum_tree.run(options.quick) if "sum_tree" in chosen else []
+    results = []
+    for name in options.names or ("throughput",):
+        module = importlib.import_module(f"benchmarks.{name}")
+        print(f"\n== {name}: {' '.join(module.__doc__.split('.')[0].split())}.", flush=True)
+        results += module.run(options.quick)
     if options.json is not None:
-        content = {"machine": machine() | {"versions": versions()}, "results": results}
+        content = {"machine": machine() | {"versions": versions()}, "results": [asdict(result) for result in results]}
         options.json.write_text(json.dumps(content, indent=2) + "\n")
     return 0
 

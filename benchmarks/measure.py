@@ -9,9 +9,9 @@ import multiprocessing
 import resource
 import statistics
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any, NamedTuple
 
@@ -55,12 +55,24 @@ class Result:
     """Largest resident memory, of all processes of the case."""
     steps_per_agent: int
     """In one repetition."""
-    repetitions: int
+    us_each: tuple[float, ...]
+    """Of each repetition."""
 
-    @property
-    def us(self) -> str:
-        """Median and range, for a table."""
-        return f"{_digits(self.us_per_agent_step):>10s}  ({_digits(self.us_low)}-{_digits(self.us_high)})"
+
+def spread(values: Sequence[float]) -> str:
+    """Median and range, for a table."""
+    low, middle, high = (_digits(value) for value in (min(values), statistics.median(values), max(values)))
+    return f"{middle:>8s}  {f'({low}-{high})':18s}"
+
+
+def header() -> None:
+    """Prints the heading of a table of results."""
+    print(f"{'case':16s}{'agents':>7s}{'us/agent-step':>14s}  {'(range)':18s}{'compile s':>9s}{'peak MB':>9s}")
+
+
+def row(r: Result) -> None:
+    """Prints a result."""
+    print(f"{r.case:16s}{r.agents:7d}{'':6s}{spread(r.us_each)}{r.compile_s:9.1f}{r.peak_rss_mb:9.0f}", flush=True)
 
 
 class NotInstalled(Exception):
@@ -130,7 +142,7 @@ class Running:
             self._compile_s,
             sum(self._peaks),
             self.case.steps,
-            len(us),
+            tuple(us),
         )
 
     def stop(self) -> None:
@@ -158,10 +170,8 @@ def in_turns(cases: Iterable[Case], repetitions: int) -> tuple[list[Result], dic
 
 
 def alone(case: Case, repetitions: int) -> Result:
-    """The result of one case."""
-    return in_turns([case], repetitions)[0][0]
-
-
-def as_json(results: list[Result]) -> list[dict[str, Any]]:
-    """Results as the JSON file has them."""
-    return [asdict(result) for result in results]
+    """The result of one case; raises NotInstalled."""
+    results, lacking = in_turns([case], repetitions)
+    if lacking:
+        raise NotInstalled(*lacking.values())
+    return results[0]

@@ -43,7 +43,7 @@ def environment(agents: int, steps: int) -> Ready:
     return Ready(lambda: jax.block_until_ready(run(params, keys)), seconds)
 
 
-def learner(name: str, agents: int, steps: int, **settings: Any) -> Ready:
+def learner(name: str, agents: int, steps: int, devices: int | None = None, **settings: Any) -> Ready:
     """A learner's training at the paper's sizes: acting, environment, replay, update, log, exact evaluation.
 
     The agents go on from one repetition to the next, DDQN with a full memory from the start. TLwD is given
@@ -53,6 +53,9 @@ def learner(name: str, agents: int, steps: int, **settings: Any) -> Ready:
 
     parallel.use_all_cores()
     import jax
+
+    if devices:
+        jax.config.update("jax_num_cpu_devices", devices)
     import jax.numpy as jnp
 
     import jrcjax
