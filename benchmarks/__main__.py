@@ -41,7 +41,7 @@ def main(args: list[str] | None = None) -> int:
     results = []
     for name in options.names or ("throughput",):
         module = importlib.import_module(f"benchmarks.{name}")
-        print(f"\n== {name}: {' '.join(module.__doc__.split('.')[0].split())}.", flush=True)
+        print(f"\n== {name}: {' '.join(str(module.__doc__).split('.')[0].split())}.", flush=True)
         results += module.run(options.quick)
     if options.json is not None:
         content = {"machine": machine() | {"versions": versions()}, "results": [asdict(result) for result in results]}

@@ -81,15 +81,16 @@ def learner(name: str, agents: int, steps: int, devices: int | None = None, **se
         return new._replace(learner=new.learner._replace(ring=ring))
 
     start = parallel.over_agents(agent)
-    advance = parallel.over_agents(lambda shared, agent: run_episodes(agent, *shared, hparams, rule), in_place=True)
+    advance = parallel.over_agents(
+        lambda shared, agent: run_episodes(agent, shared[0], episodes, shared[1], hparams, rule), in_place=True
+    )
     keys = jax.random.split(jax.random.key(0), parallel.padded(agents))
     start, start_s = compiled(start, source, keys)
     now = [start(source, keys), config.replay_capacity // params.max_steps_in_episode + 1]
-    shared = lambda: (jnp.int32(now[1]), episodes, params)  # noqa: E731
-    advance, advance_s = compiled(advance, shared(), now[0])
+    advance, advance_s = compiled(advance, (jnp.int32(now[1]), params), now[0])
 
     def one_repetition() -> None:
-        now[0], log = advance(shared(), now[0])
+        now[0], log = advance((jnp.int32(now[1]), params), now[0])
         now[1] += episodes
         jax.block_until_ready(log)
 

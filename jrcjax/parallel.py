@@ -34,10 +34,10 @@ def use_all_cores() -> None:
 
     Call it before any array is made; on an accelerator it changes nothing. Flags that XLA_FLAGS has already are left.
     """
-    jax.config.update("jax_num_cpu_devices", usable_cores())
     given = os.environ.get("XLA_FLAGS", "")
     added = [f"{name}={value}" for name, value in _XLA_FLAGS.items() if name not in given]
     os.environ["XLA_FLAGS"] = " ".join([given, *added]).strip()
+    jax.config.update("jax_num_cpu_devices", usable_cores())
 
 
 def keep_compiled() -> None:

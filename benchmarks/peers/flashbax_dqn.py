@@ -46,7 +46,7 @@ def _setup(agents: int, steps: int, method: Any) -> Ready:
 
     env, params = jrcjax.JRCEnv(), jrcjax.paper_params("source")
     hparams, config = jrcjax.HParams(), jrcjax.Config()
-    network = nn.Sequential([nn.Dense(24), nn.relu, nn.Dense(24), nn.relu, nn.Dense(env.num_actions)])
+    network: Any = nn.Sequential([nn.Dense(24), nn.relu, nn.Dense(24), nn.relu, nn.Dense(env.num_actions)])
     optimiser = optax.adam(float(hparams.learning_rate))
     fill, learn = method(network, optimiser, hparams, config)
 

@@ -11,10 +11,10 @@ def setup(agents: int, steps: int) -> Ready:
     """Trains on the paper's source environment at Table I's sizes; evaluation is left out."""
     import jax
     import jax.numpy as jnp
-    import rejax
+    import rejax  # pyright: ignore[reportMissingImports]
     from flax import linen as nn
-    from rejax.buffers import Minibatch
-    from rejax.networks import DiscreteQNetwork, EpsilonGreedyPolicy
+    from rejax.buffers import Minibatch  # pyright: ignore[reportMissingImports]
+    from rejax.networks import DiscreteQNetwork, EpsilonGreedyPolicy  # pyright: ignore[reportMissingImports]
 
     import jrcjax
     from benchmarks.ours import compiled

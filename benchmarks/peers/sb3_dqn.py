@@ -7,8 +7,8 @@ from benchmarks.measure import Ready
 
 def setup(agents: int, steps: int) -> Ready:
     """Trains one agent on the paper's source environment at Table I's sizes, learning in every step."""
-    import torch
-    from stable_baselines3 import DQN
+    import torch  # pyright: ignore[reportMissingImports]
+    from stable_baselines3 import DQN  # pyright: ignore[reportMissingImports]
 
     import jrcjax
     from jrcjax.adapters.gymnasium_env import GymnasiumEnv
