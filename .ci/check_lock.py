@@ -10,6 +10,7 @@ from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).resolve().parent.parent
 PYTHONS = ("3.11", "3.12", "3.13")
+NOT_LOCKED = {"peers"}  # what the benchmarks compare with; PyTorch's wheels differ between platforms and sources
 HASH = re.compile(r"--hash=sha256:[0-9a-f]{64}(?=\s|$)")
 
 
@@ -41,8 +42,9 @@ def main() -> int:
         locked.setdefault(canonicalize_name(requirement.name), []).append(requirement)
 
     wanted = list(project["dependencies"])
-    for extra in project.get("optional-dependencies", {}).values():
-        wanted += extra
+    for name, extra in project.get("optional-dependencies", {}).items():
+        if name not in NOT_LOCKED:
+            wanted += extra
     for requirement in map(Requirement, wanted):
         entries = locked.get(canonicalize_name(requirement.name), [])
         for entry in entries:
