@@ -25,7 +25,7 @@ def product(a: Float, b: Float) -> Float:
 
 
 def _added_up(a: Float, b: Float) -> Float:
-    return sum((a[:, k, None] * b[k] for k in range(1, a.shape[1])), a[:, 0, None] * b[0])
+    return sum((a[:, k, None] * b[None, k] for k in range(1, a.shape[1])), a[:, 0, None] * b[None, 0])
 
 
 @functools.partial(jax.custom_vjp, nondiff_argnums=(3,))
