@@ -74,10 +74,11 @@ def learner(name: str, agents: int, steps: int, devices: int | None = None, **se
         new = init_agent(key, hparams, rule, source)
         if name != "ddqn":
             return new
-        ids = jax.random.randint(key, (4, config.replay_capacity), 0, jnp.array([[32], [4], [32], [1]]))
+        states, actions = params.num_states, params.num_actions
+        ids = jax.random.randint(key, (4, config.replay_capacity), 0, jnp.array([[states], [actions], [states], [1]]))
         reward = jax.random.normal(key, (config.replay_capacity,))
         transitions = replay.Transition(ids[0], ids[1], reward, ids[2], ids[3])
-        ring = packing.pack(transitions, replay.layout(params.num_states, params.num_actions))
+        ring = packing.pack(transitions, replay.layout(states, actions))
         return new._replace(learner=new.learner._replace(ring=ring))
 
     start = parallel.over_agents(agent)

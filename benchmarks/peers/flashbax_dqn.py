@@ -61,7 +61,7 @@ def _setup(agents: int, steps: int, method: Any) -> Ready:
         greedy = jnp.argmax(network.apply(agent.params, agent.obs))
         explores = jax.random.uniform(explore_key) < epsilon(agent.step, hparams)
         action = jnp.where(explores, jax.random.randint(act_key, (), 0, env.num_actions), greedy)
-        next_obs, state, reward, terminated, truncated, info = env.step(env_key, agent.env, action, params)
+        next_obs, state, reward, terminated, _, info = env.step(env_key, agent.env, action, params)
         item = {
             "obs": agent.obs,
             "action": action,
@@ -69,7 +69,7 @@ def _setup(agents: int, steps: int, method: Any) -> Ready:
             "next_obs": info["final_observation"],
             "discount": jnp.where(terminated, 0.0, hparams.discount),
         }
-        agent = learn(agent, item, terminated | truncated, sample_key)
+        agent = learn(agent, item, sample_key)
         due = (agent.step + 1) % hparams.target_period == 0
         target = jax.tree.map(lambda new, old: jnp.where(due, new, old), agent.params, agent.target)
         return agent._replace(target=target, obs=next_obs, env=state, key=key, step=agent.step + 1), None
@@ -116,7 +116,7 @@ def _uniform(network, optimiser, hparams, config):
         many = random_items(key, config.replay_capacity)
         return of_sequences.add(buffer.init(jax.tree.map(lambda a: a[0], many)), many), ()
 
-    def learn(agent: Agent, item, over, key):
+    def learn(agent: Agent, item, key):
         memory = buffer.add(agent.memory, item)
         batch = buffer.sample(memory, key).experience
 
@@ -159,7 +159,7 @@ def _prioritised(network, optimiser, hparams, config):
         memory = buffer.init(jax.tree.map(lambda a: a[0], window))
         return of_sequences.add(memory, many), window
 
-    def learn(agent: Agent, item, over, key):
+    def learn(agent: Agent, item, key):
         new = item | {"n_return": 0.0, "n_discount": 1.0, "n_obs": item["next_obs"], "is_demonstration": False}
         window = jax.tree.map(
             lambda old, x: jnp.concatenate([old[1:], jnp.asarray(x, old.dtype)[None]]), agent.window, new
