@@ -66,6 +66,7 @@ def init_agent(key: Key, hparams: HParams, learner: Learner, source: Source | No
 def run_slot(
     carry: tuple[Int, Any, metrics.Metrics],
     words: Words,
+    drawn: Any,
     number: Int,
     last: jax.Array,
     env_params: EnvParams,
@@ -76,7 +77,8 @@ def run_slot(
 
     Args:
       carry: state id, learner state, sums of the metrics.
-      words: random words of the slot: the environment's, the action's, the update's.
+      words: random words of the slot: the environment's, then the action's.
+      drawn: what the learner drew for its update.
       number: slots before this one, the same for all agents.
       last: whether the slot is the episode's last.
       env_params: the environment.
@@ -84,12 +86,12 @@ def run_slot(
       learner: the learning rule.
     """
     state, learner_state, sums = carry
-    of_slot, of_action, of_update = jnp.split(words, [slot.NUM_WORDS, slot.NUM_WORDS + exploration.NUM_WORDS])
+    of_slot, of_action = jnp.split(words, [slot.NUM_WORDS])
     action = learner.act(learner_state, state, number, of_action, hparams)
     outcome = slot.run_slot(of_slot, state, action, env_params)
     terminal = last & (env_params.terminal_time_limit == 1)
     transition = Transition(state, action, outcome.reward, outcome.next_state, terminal.astype(jnp.int32))
-    learner_state = learner.update(learner_state, transition, number, of_update, hparams)
+    learner_state = learner.update(learner_state, transition, number, drawn, hparams)
     return outcome.next_state, learner_state, slot.measure(sums, outcome, env_params)
 
 
@@ -101,13 +103,15 @@ def run_episode(
     num_words = slot.NUM_WORDS + max(learner.num_words, exploration.NUM_WORDS)
     key = jax.random.fold_in(jax.random.fold_in(agent.key, _EPISODES), episode)
     words = rng.bits(key, (slots + 1, num_words))
+    of_slots, of_updates = jnp.split(words[:slots], [slot.NUM_WORDS + exploration.NUM_WORDS], axis=1)
+    numbers = episode * slots + jnp.arange(slots)
 
     def one_slot(carry, xs):
-        words, i = xs
-        return run_slot(carry, words, episode * slots + i, i == slots - 1, env_params, hparams, learner), None
+        words, drawn, number, i = xs
+        return run_slot(carry, words, drawn, number, i == slots - 1, env_params, hparams, learner), None
 
     start = (slot.initial_state(words[slots, : slot.NUM_WORDS], env_params), agent.learner, metrics.zero())
-    (_, learner_state, sums), _ = jax.lax.scan(one_slot, start, (words[:slots], jnp.arange(slots)))
+    (_, learner_state, sums), _ = jax.lax.scan(one_slot, start, (of_slots, learner.draw(of_updates, numbers), numbers, jnp.arange(slots)))
     exact = evaluate_policy(env_params, learner.policy(learner_state))
     log = Log(metrics.average_reward(sums), metrics.throughput(sums), metrics.miss_detection(sums), *exact)
     return AgentState(agent.key, learner_state), log

@@ -40,8 +40,11 @@ def add(ring: Words, transition: Transition, count: Int, where: packing.Layout) 
     return jax.lax.dynamic_update_slice(ring, packing.pack(transition, where)[None], (count % ring.shape[0], 0))
 
 
-def sample(ring: Words, words: Words, count: Int, where: packing.Layout) -> Transition:
-    """Uniform sample with replacement of the `count` >= 1 transitions added so far; one word [B] each."""
-    filled = jnp.minimum(count, ring.shape[0])
-    rows = ring.at[rng.index(words, filled)].get(mode="promise_in_bounds")
-    return packing.unpack(rows, where)
+def draw(words: Words, count: Int, capacity: int) -> Int:
+    """Positions of a uniform sample with replacement of the `count` >= 1 transitions added so far; a word each."""
+    return rng.index(words, jnp.minimum(count, capacity))
+
+
+def at(ring: Words, positions: Int, where: packing.Layout) -> Transition:
+    """The transitions at these positions; any shape."""
+    return packing.unpack(ring.at[positions].get(mode="promise_in_bounds"), where)

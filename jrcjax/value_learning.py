@@ -51,18 +51,19 @@ def greedy_policy(q: Float) -> Float:
     return jax.nn.one_hot(jnp.argmax(q, axis=-1), q.shape[-1])
 
 
-def large_margin_loss(q: Float, expert: Int, margin: Float) -> Float:
+def large_margin_loss(q: Float, expert: Int, margin: Float, axis: int = 1) -> Float:
     """max_a [Q(s, a) + Gamma(a_E, a)] - Q(s, a_E), equation (29), with Gamma the margin for a != a_E and 0 for a_E.
 
     Args:
       q: [B, A] values of the demonstrated states.
       expert: [B] the demonstrator's actions a_E.
       margin: a scalar.
+      axis: that of the actions; 0 for q of [A, B].
     """
     chex.assert_rank([q, expert], [2, 1])
-    is_expert = jax.nn.one_hot(expert, q.shape[-1], dtype=bool)
-    best = jnp.max(q + jnp.where(is_expert, 0.0, margin), axis=-1)
-    return best - jnp.where(is_expert, q, 0.0).sum(axis=-1)
+    is_expert = jax.nn.one_hot(expert, q.shape[axis], dtype=bool, axis=axis)
+    best = jnp.max(q + jnp.where(is_expert, 0.0, margin), axis=axis)
+    return best - jnp.where(is_expert, q, 0.0).sum(axis=axis)
 
 
 def l2_loss(weights: Any) -> Float:

@@ -43,10 +43,13 @@ class Learner(NamedTuple):
     """(key, hparams, source) to the learner state before the first slot; pre-training is done here."""
     act: Callable[[State, Int, Int, Words, HParams], Int]
     """(learner state, state id, slot, words, hparams) to an action."""
-    update: Callable[[State, Transition, Int, Words, HParams], State]
-    """(learner state, transition, slot, words, hparams) to the next learner state."""
+    update: Callable[[State, Transition, Int, Any, HParams], State]
+    """(learner state, transition, slot, what `draw` made of the slot's words, hparams) to the next learner state."""
     policy: Callable[[State], Float]
     """Learner state to the policy without exploration, [S, A] probabilities."""
+    draw: Callable[[Words, Int], Any] = lambda words, slots: words
+    """(words of `update` [slots, words], numbers of the slots [slots]) to what `update` is given in each slot, every leaf
+    with a leading axis of slots. What depends on nothing else costs less for a whole episode at once."""
     needs_source: bool = False
     """Whether `init` needs a source."""
 

@@ -52,9 +52,12 @@ def ddqn(spec: Spec, config: Config) -> Learner:
     def act(state: DDQNState, state_id, slot, words, hparams: HParams) -> Int:
         return exploration.epsilon_greedy(words, function.of_state(state.weights, state_id), epsilon(slot, hparams))
 
-    def update(state: DDQNState, transition: Transition, slot, words, hparams: HParams) -> DDQNState:
+    def draw(words: Words, slots: Int) -> Int:
+        return replay.draw(words, slots[:, None] + 1, config.replay_capacity)
+
+    def update(state: DDQNState, transition: Transition, slot, positions: Int, hparams: HParams) -> DDQNState:
         ring = replay.add(state.ring, transition, slot, where)
-        batch = replay.sample(ring, words, slot + 1, where)
+        batch = replay.at(ring, positions, where)
         # After every target_period updates theta' <- theta. Done at the start of the slot that follows, whose table
         # is needed anyway.
         due = slot % hparams.target_period == 0
@@ -69,6 +72,7 @@ def ddqn(spec: Spec, config: Config) -> Learner:
         act=act,
         update=update,
         policy=lambda state: greedy_policy(function.table(state.weights)),
+        draw=draw,
     )
 
 

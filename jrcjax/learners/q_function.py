@@ -36,8 +36,12 @@ class QFunction(NamedTuple):
     def columns(self, weights: Any, ids: Int | np.ndarray | None = None) -> Float:
         """Q(s, .; theta) of states [N], [A, N]; of all states if there are no ids."""
         # A constant of NumPy, so that XLA sees that all calls compute the same and does it once.
-        ids = np.arange(states.num_states(self.shape)) if ids is None else ids
-        return self.network.apply(weights, states.features_of(ids, self.shape).T)  # pyright: ignore
+        if ids is None:
+            with jax.ensure_compile_time_eval():
+                features = np.asarray(states.features_of(jnp.arange(states.num_states(self.shape)), self.shape).T)
+        else:
+            features = states.features_of(ids, self.shape).T
+        return self.network.apply(weights, features)  # pyright: ignore
 
     def table(self, weights: Any) -> Float:
         """Q(s, .; theta) of all states, [S, A]."""
@@ -58,10 +62,10 @@ class QFunction(NamedTuple):
         return jnp.take_along_axis(self.columns(weights, ids), actions[None], axis=0)[0]
 
     def of_states(self, weights: Any, ids: Int) -> Float:
-        """Q(s, .; theta) of a batch of states, [B, A]."""
+        """Q(s, .; theta) of a batch of states, [A, B]."""
         if self.as_table:
-            return self.table(weights).at[ids].get(mode="promise_in_bounds")
-        return self.columns(weights, ids).T
+            return self.columns(weights).at[:, ids].get(mode="promise_in_bounds")
+        return self.columns(weights, ids)
 
     def double_q(self, weights: Any, target: Any, ids: Int) -> Float:
         """Q(s', argmax_a Q(s', a; theta); theta') of a batch of next states, [B]; no gradient flows through it."""

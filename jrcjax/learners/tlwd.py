@@ -54,11 +54,11 @@ def losses(function: QFunction, weights: Any, target: Any, batch: Sample, hparam
     """The errors and the large-margin loss of each transition of a batch."""
     t = batch.transitions
     q = function.of_states(weights, t.state)
-    chosen = (q * jax.nn.one_hot(t.action, q.shape[-1])).sum(axis=-1)
+    chosen = jnp.where(jax.nn.one_hot(t.action, q.shape[0], dtype=bool, axis=0), q, 0.0).sum(axis=0)
     discount = jnp.where(t.terminal == 1, 0.0, hparams.discount)
     y = td_target(t.reward, discount, function.double_q(weights, target, t.next_state))
     y_n = td_target(t.n_return, t.n_discount, function.greatest(target, t.n_state))
-    margin = jnp.where(batch.is_demonstration, large_margin_loss(q, t.action, hparams.margin), 0.0)
+    margin = jnp.where(batch.is_demonstration, large_margin_loss(q, t.action, hparams.margin, axis=0), 0.0)
     return Losses(y - chosen, y_n - chosen, margin)
 
 
