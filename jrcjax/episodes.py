@@ -111,7 +111,9 @@ def run_episode(
         return run_slot(carry, words, drawn, number, i == slots - 1, env_params, hparams, learner), None
 
     start = (slot.initial_state(words[slots, : slot.NUM_WORDS], env_params), agent.learner, metrics.zero())
-    (_, learner_state, sums), _ = jax.lax.scan(one_slot, start, (of_slots, learner.draw(of_updates, numbers), numbers, jnp.arange(slots)))
+    (_, learner_state, sums), _ = jax.lax.scan(
+        one_slot, start, (of_slots, learner.draw(of_updates, numbers), numbers, jnp.arange(slots))
+    )
     exact = evaluate_policy(env_params, learner.policy(learner_state))
     log = Log(metrics.average_reward(sums), metrics.throughput(sums), metrics.miss_detection(sums), *exact)
     return AgentState(agent.key, learner_state), log

@@ -176,7 +176,7 @@ def test_values_are_columns_of_features_in_order_of_ids(form):
     np.testing.assert_allclose(function.table(online), wanted, **close)
     some, actions = jnp.asarray([5, 0, 11]), jnp.asarray([3, 0, 1])
     np.testing.assert_allclose(function.columns(online, some).T, wanted[some], **close)
-    np.testing.assert_allclose(function.of_states(online, some), wanted[some], **close)
+    np.testing.assert_allclose(function.of_states(online, some), wanted[some].T, **close)
     np.testing.assert_allclose(function.of_state(online, jnp.int32(5)), wanted[5], **close)
     np.testing.assert_allclose(function.chosen(online, some, actions), wanted[some, actions], **close)
     of_target, kept = forward(layers_of(target), all_features(SPEC.shape))[-1].T, function.target_of(target)
@@ -210,9 +210,9 @@ def test_updates_against_algorithm_1(form, hidden, optimiser, rule, rate):
     twin = Algorithm1(start, all_features(SPEC.shape), capacity, period, discount, rate, rule)
     transitions = random_batch(7, updates, scale=1.0)
     words = jax.random.bits(jax.random.key(6), (updates, batch_size), jnp.uint32)
-    update = jax.jit(learner.update)
+    drawn, update = learner.draw(words, jnp.arange(words.shape[0])), jax.jit(learner.update)
     for i in range(updates):
-        state = update(state, on_device(Transition(*(f[i] for f in transitions))), i, words[i], hparams)
+        state = update(state, on_device(Transition(*(f[i] for f in transitions))), i, drawn[i], hparams)
         twin.update(tuple(field[i].item() for field in transitions), np.asarray(words[i]))
         if i not in (0, 1, 14, 15, 16, 31, 59):  # around the moments when the ring is full
             continue
@@ -235,9 +235,9 @@ def test_target_is_copied_after_every_period_updates_and_never_else(form, period
     states = [learner.init(jax.random.key(0), hparams)]
     transitions = on_device(random_batch(2, 17))
     words = jax.random.bits(jax.random.key(1), (17, 8), jnp.uint32)
-    update = jax.jit(learner.update)
+    drawn, update = learner.draw(words, jnp.arange(words.shape[0])), jax.jit(learner.update)
     for i in range(17):
-        states.append(update(states[-1], Transition(*(f[i] for f in transitions)), i, words[i], hparams))
+        states.append(update(states[-1], Transition(*(f[i] for f in transitions)), i, drawn[i], hparams))
     for i, state in enumerate(states[1:]):
         # Update i used the weights as they were after the last multiple of `period` updates before it.
         wanted = as_target(states[i - i % period].weights)

@@ -7,6 +7,7 @@ import pytest
 
 import jrcjax
 from jrcjax import parallel
+from jrcjax.episodes import init_agent, learner_for, run_episodes
 from jrcjax.hparams import Config, HParams
 
 UNIT = parallel.BLOCK * jax.device_count()
@@ -104,3 +105,31 @@ def test_in_place_gives_the_same_agents_and_results():
     got = parallel.over_agents(one, in_place=True)(jnp.int32(5), jax.tree.map(jnp.copy, agents))
     jax.tree.map(np.testing.assert_array_equal, got, wanted)
     np.testing.assert_array_equal(got[0]["b"], np.arange(3 * UNIT) + 5)
+
+
+@pytest.mark.parametrize("blocks", [1, 3])
+@pytest.mark.parametrize("name", ["ddqn", "tlwd"])
+def test_a_slot_computes_the_network_once(name, blocks):
+    """For the action, the target and the loss; XLA must see that they are the same, in whatever loop it is."""
+    params = environment()
+    config = Config(episodes=2, batch_size=8, replay_capacity=64, demonstrations=32, pretraining=0)
+    learner = learner_for(name, params, config)
+    source = jax.eval_shape(
+        lambda key: jrcjax.train_source(key, params, HParams(), config)[0], jax.random.key(0)
+    )  # shapes are all that compiling needs
+    agents = jax.eval_shape(
+        jax.vmap(lambda key, source: init_agent(key, HParams(), learner, source), in_axes=(0, None)),
+        jax.random.split(jax.random.key(0), blocks * UNIT),
+        source,
+    )
+
+    def run(first, agent):
+        return run_episodes(agent, first, 2, params, HParams(), learner)
+
+    text = parallel.over_agents(run, in_place=True).lower(jnp.int32(0), agents).compile().as_text()
+    forward = [
+        line.count("while/body")
+        for line in text.splitlines()
+        if " dot(" in line and 'ColumnDense_1/dot_general"' in line and "transpose(" not in line
+    ]
+    assert forward.count(max(forward)) == 1

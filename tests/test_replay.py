@@ -1,3 +1,4 @@
+import functools
 from collections import Counter, deque
 
 import jax
@@ -14,7 +15,12 @@ from jrcjax.replay import Transition
 STATES, ACTIONS = 32, 4
 WHERE = replay.layout(STATES, ACTIONS)
 ADD = jax.jit(replay.add, static_argnums=3)
-SAMPLE = jax.jit(replay.sample, static_argnums=3)
+
+
+@functools.partial(jax.jit, static_argnums=3)
+def sample(ring, words, count, where):
+    return replay.at(ring, replay.draw(words, count, ring.shape[0]), where)
+
 
 TRANSITIONS = st.tuples(
     st.integers(0, STATES - 1),
@@ -53,14 +59,14 @@ def test_ring_against_a_list_of_the_latest(capacity, transitions):
         ring = ADD(ring, Transition(*transition), count, WHERE)
         twin.append(transition)
         # These words pick each filled slot once, so the sample is all that the ring holds.
-        held = SAMPLE(ring, first_word_of_each_index(len(twin)), count + 1, WHERE)
+        held = sample(ring, first_word_of_each_index(len(twin)), count + 1, WHERE)
         assert Counter(as_tuples(held)) == Counter(twin)
 
 
 @pytest.mark.parametrize(("capacity", "count"), [(64, 40), (64, 64), (64, 150)])
 def test_samples_are_uniform_over_what_is_held(capacity, count):
     words = jax.random.bits(jax.random.key(count), (40_000,), jnp.uint32)
-    rewards = np.asarray(SAMPLE(filled_ring(capacity, count), words, count, WHERE).reward).astype(int)
+    rewards = np.asarray(sample(filled_ring(capacity, count), words, count, WHERE).reward).astype(int)
     held = np.arange(max(count - capacity, 0), count) + 1
     frequencies = np.array([(rewards == reward).sum() for reward in held])
     assert frequencies.sum() == len(rewards)
@@ -71,10 +77,10 @@ def test_samples_are_uniform_over_what_is_held(capacity, count):
 def test_slots_not_yet_written_are_never_sampled(count):
     random = jax.random.bits(jax.random.key(1), (5000,), jnp.uint32)
     words = jnp.concatenate([jnp.asarray([0, 2**32 - 1], jnp.uint32), random])
-    batch = SAMPLE(filled_ring(64, count), words, count, WHERE)
+    batch = sample(filled_ring(64, count), words, count, WHERE)
     assert set(as_tuples(batch)) <= {numbered(i) for i in range(count)}
 
 
 def test_sampling_is_with_replacement():
-    batch = SAMPLE(filled_ring(4, 4), jnp.zeros(8, jnp.uint32), 4, WHERE)
+    batch = sample(filled_ring(4, 4), jnp.zeros(8, jnp.uint32), 4, WHERE)
     assert as_tuples(batch) == [numbered(0)] * 8

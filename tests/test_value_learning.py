@@ -92,6 +92,8 @@ def test_large_margin_loss_and_gradient_against_a_loop(margin, num_actions):
     )
     arguments = jnp.asarray(q), jnp.asarray(expert, jnp.int32), jnp.float32(margin)
     np.testing.assert_allclose(value_learning.large_margin_loss(*arguments), wanted, rtol=0, atol=2e-6)
+    columns = value_learning.large_margin_loss(arguments[0].T, *arguments[1:], axis=0)
+    np.testing.assert_allclose(columns, wanted, rtol=0, atol=2e-6)
     gradient = jax.grad(lambda q, *rest: value_learning.large_margin_loss(q, *rest).sum())(*arguments)
     np.testing.assert_array_equal(gradient, gradients)
     # Otherwise the expert's action would always, or never, win.

@@ -48,8 +48,8 @@ class Learner(NamedTuple):
     policy: Callable[[State], Float]
     """Learner state to the policy without exploration, [S, A] probabilities."""
     draw: Callable[[Words, Int], Any] = lambda words, slots: words
-    """(words of `update` [slots, words], numbers of the slots [slots]) to what `update` is given in each slot, every leaf
-    with a leading axis of slots. What depends on nothing else costs less for a whole episode at once."""
+    """(words of `update` [slots, words], numbers of the slots [slots]) to what `update` is given in each slot, leaves with
+    a leading axis of slots. What needs nothing but words costs less for a whole episode at once."""
     needs_source: bool = False
     """Whether `init` needs a source."""
 

@@ -33,15 +33,14 @@ class QFunction(NamedTuple):
         """Random weights."""
         return self.network.init(key, jnp.zeros((len(self.shape), 1)))
 
-    def columns(self, weights: Any, ids: Int | np.ndarray | None = None) -> Float:
+    def columns(self, weights: Any, ids: Int | None = None) -> Float:
         """Q(s, .; theta) of states [N], [A, N]; of all states if there are no ids."""
-        # A constant of NumPy, so that XLA sees that all calls compute the same and does it once.
-        if ids is None:
-            with jax.ensure_compile_time_eval():
-                features = np.asarray(states.features_of(jnp.arange(states.num_states(self.shape)), self.shape).T)
+        if ids is not None:
+            features = states.features_of(ids, self.shape)
         else:
-            features = states.features_of(ids, self.shape).T
-        return self.network.apply(weights, features)  # pyright: ignore
+            with jax.ensure_compile_time_eval():  # a constant, by which XLA sees that all calls compute the same
+                features = np.asarray(states.features_of(jnp.arange(states.num_states(self.shape)), self.shape))
+        return self.network.apply(weights, features.T)  # pyright: ignore
 
     def table(self, weights: Any) -> Float:
         """Q(s, .; theta) of all states, [S, A]."""
