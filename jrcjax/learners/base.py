@@ -48,7 +48,7 @@ class Learner(NamedTuple):
     policy: Callable[[State], Float]
     """Learner state to the policy without exploration, [S, A] probabilities."""
     draw: Callable[[Words, Int], Any] = lambda words, slots: words
-    """(words of `update` [slots, words], numbers of the slots [slots]) to what `update` is given in each slot; leaves have
+    """(words of `update` [slots, words], numbers of the slots [slots]) to what `update` is given per slot; leaves have
     a leading axis of slots. What needs nothing but words costs less for a whole episode at once."""
     needs_source: bool = False
     """Whether `init` needs a source."""
