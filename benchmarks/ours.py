@@ -46,8 +46,8 @@ def environment(agents: int, steps: int) -> Ready:
 def learner(name: str, agents: int, steps: int, devices: int | None = None, **settings: Any) -> Ready:
     """A learner's training at the paper's sizes: acting, environment, replay, update, log, exact evaluation.
 
-    The agents go on from one repetition to the next, DDQN with a full memory from the start. TLwD is given
-    demonstrations and goes without pre-training, so that a step is one of its online steps.
+    The agents go on from one repetition to the next, DDQN and TLwD with a memory that is full from the start. TLwD goes
+    without pre-training, so that a step is one of its online steps.
     """
     from jrcjax import parallel
 
@@ -59,7 +59,7 @@ def learner(name: str, agents: int, steps: int, devices: int | None = None, **se
     import jax.numpy as jnp
 
     import jrcjax
-    from jrcjax import packing, replay
+    from jrcjax import n_step, packing, prioritised_replay, replay
     from jrcjax.episodes import init_agent, learner_for, run_episodes
 
     params, hparams = jrcjax.paper_params("source"), jrcjax.HParams()
@@ -72,14 +72,17 @@ def learner(name: str, agents: int, steps: int, devices: int | None = None, **se
 
     def agent(source, key):
         new = init_agent(key, hparams, rule, source)
-        if name != "ddqn":
+        if name not in ("ddqn", "tlwd"):
             return new
-        states, actions = params.num_states, params.num_actions
-        ids = jax.random.randint(key, (4, config.replay_capacity), 0, jnp.array([[states], [actions], [states], [1]]))
-        reward = jax.random.normal(key, (config.replay_capacity,))
-        transitions = replay.Transition(ids[0], ids[1], reward, ids[2], ids[3])
-        ring = packing.pack(transitions, replay.layout(states, actions))
-        return new._replace(learner=new.learner._replace(ring=ring))
+        size, states, actions = config.replay_capacity, params.num_states, params.num_actions
+        ids = jax.random.randint(key, (4, size), 0, jnp.array([[states], [actions], [states], [1]]))
+        one_step = replay.Transition(ids[0], ids[1], jax.random.normal(key, (size,)), ids[2], ids[3])
+        if name == "ddqn":
+            ring = packing.pack(one_step, replay.layout(states, actions))
+            return new._replace(learner=new.learner._replace(ring=ring))
+        items = n_step.NStepTransition(*one_step, one_step.reward, jnp.full(size, 0.9), one_step.next_state)
+        memory = prioritised_replay.init(items, prioritised_replay.layout(states, actions, size, size))
+        return new._replace(learner=new.learner._replace(memory=memory))
 
     start = parallel.over_agents(agent)
     advance = parallel.over_agents(

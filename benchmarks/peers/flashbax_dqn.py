@@ -147,13 +147,13 @@ def _prioritised(network, optimiser, hparams, config):
     n = config.n_step
 
     def fill(key):
-        """A memory of demonstrations, and the last n transitions, whose returns are still growing."""
-        many = random_items(key, config.demonstrations)
+        """A full memory, and the last n transitions, whose returns are still growing."""
+        many = random_items(key, config.replay_capacity)
         many |= {
             "n_return": many["reward"],
             "n_discount": many["discount"],
             "n_obs": many["next_obs"],
-            "is_demonstration": jnp.ones(config.demonstrations, bool),
+            "is_demonstration": jnp.arange(config.replay_capacity) < config.demonstrations,
         }
         window = jax.tree.map(lambda a: jnp.zeros((n, *a.shape[1:]), a.dtype), many)
         memory = buffer.init(jax.tree.map(lambda a: a[0], window))
@@ -173,8 +173,7 @@ def _prioritised(network, optimiser, hparams, config):
         memory = buffer.add(agent.memory, jax.tree.map(lambda a: a[0], window))
         sample = buffer.sample(memory, key)
         batch = sample.experience
-        size = jnp.minimum(config.demonstrations + agent.step + 1, config.replay_capacity)
-        weights = (size * sample.probabilities) ** -hparams.importance_start
+        weights = (config.replay_capacity * sample.probabilities) ** -hparams.importance_start
         weights = weights / weights.max()
 
         def loss(params):
