@@ -35,12 +35,12 @@ sweep = registry.SWEEPS[sys.argv[1]]
 size = Size()
 points = program.points_of(sweep, size.preset)
 spec = spec_of(jax.tree.map(lambda a: a[0], points.params))
-compiled = program.program_of(sweep.learners, spec, size.config, program.chunk_of(size.episodes))
+compiled = program.program_of(sweep.learners, spec, sweep.config(size), program.chunk_of(size.episodes))
 lanes = parallel.padded(len(sweep.x_values) * size.seeds)
 source = None
-if sweep.transfers:
+if sweep.source:
     def train(key):
-        return jrcjax.train_source(key, jrcjax.paper_params("source"), jrcjax.HParams(), size.config)[0]
+        return jrcjax.train_source(key, jrcjax.paper_params("source"), jrcjax.HParams(), sweep.config(size))[0]
     of_one = jax.eval_shape(train, jax.random.key(0))
     source = jax.tree.map(lambda a: jax.ShapeDtypeStruct((lanes, *a.shape), a.dtype), of_one)
 keys = program.keys_of(np.arange(lanes))

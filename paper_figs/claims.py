@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 import xarray as xr
 
-from paper_figs.statistics import bootstrap
+from paper_figs.statistics import Statistic, bootstrap
 
 TOLERANCE = 0.05
 """A policy within this gap of the optimum counts as having reached it."""
@@ -62,10 +62,14 @@ def judge(
     relation: str,
     limit: float,
     figure: str,
-    statistic: Callable[[np.ndarray], np.ndarray] = lambda means: means,
+    statistic: Statistic = lambda means: means,
+    extreme: Callable[[np.ndarray], np.floating] | None = None,
 ) -> Judgement:
-    """Judges "effect <= limit", or >=, where the effect is a statistic of means over seeds of `values` [seeds, ...]."""
-    value, low, high = bootstrap(values, statistic)
+    """Judges "effect <= limit", or >=, where the effect is a statistic of means over seeds of `values` [seeds, ...].
+
+    `extreme`, np.min or np.max, says which of several effects the claim is about.
+    """
+    value, low, high = bootstrap(values, statistic, extreme)
     verdict = verdict_of(low, high, relation, limit)
     return Judgement(claim, statement, effect, relation, limit, value, low, high, verdict, len(values), figure)
 
@@ -83,7 +87,7 @@ def gaps(data: xr.Dataset, algorithm: str, point: int = 0) -> np.ndarray:
 def convergence_episode(data: xr.Dataset, algorithm: str, point: int = 0) -> np.ndarray:
     """First episode from which the gap averages at most TOLERANCE over WINDOW episodes, [seeds].
 
-    Where that never happens it is the number of episodes, which flatters learners that do not converge.
+    Where that never happens it is the number of episodes, so that the mean is the restricted mean.
     """
     gap = gaps(data, algorithm, point)
     episodes = gap.shape[1]

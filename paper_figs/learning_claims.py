@@ -81,18 +81,30 @@ def target_claims(data: xr.Dataset) -> list[Judgement]:
     """C3, C4 and the target's part of C2, from the results of Fig. 5(b)."""
     converged = {name: convergence_episode(data, name) for name in ("tlwd", "dpr", "ddqn")}
     early = {name: first(data, "reward", name, _EARLY)[:, 0] for name in ("tlwd", "dpr")}
-    lead = "DDQN's convergence episode minus that of {}"
     return [
         *_reference_claims(data, "target", "5b", TOLERANCE),
         *(
             judge(
                 f"C3 ({label})",
-                f"{label} converges much faster than DDQN",
-                lead.format(label),
+                f"{label} converges faster than DDQN",
+                f"DDQN's convergence episode minus that of {label}",
                 converged["ddqn"] - converged[name],
                 ">=",
                 0.0,
                 "5b",
+            )
+            for name, label in (("tlwd", "TLwD"), ("dpr", "DPR"))
+        ),
+        *(
+            judge(
+                f"C3 ({label}, much)",
+                f"{label} converges much faster than DDQN",
+                f"DDQN's mean convergence episode over that of {label}",
+                np.stack([converged["ddqn"], converged[name]], axis=1),
+                ">=",
+                2.0,
+                "5b",
+                lambda means: means[0] / means[1],
             )
             for name, label in (("tlwd", "TLwD"), ("dpr", "DPR"))
         ),

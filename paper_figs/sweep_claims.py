@@ -20,22 +20,14 @@ def _at(data: xr.Dataset, x_name: str, x: float) -> int:
     return int(np.abs(data[x_name].values - x).argmin())
 
 
-def _smallest(means: np.ndarray) -> np.ndarray:
-    """Over all axes but the last, which counts resamples."""
-    return means.reshape(-1, means.shape[-1]).min(axis=0)
-
-
-def _largest(means: np.ndarray) -> np.ndarray:
-    return -_smallest(-means)
-
-
 def _average(means: np.ndarray) -> np.ndarray:
+    """Over all axes but the last, which counts resamples."""
     return means.reshape(-1, means.shape[-1]).mean(axis=0)
 
 
 def _reduction(means: np.ndarray) -> np.ndarray:
-    """Largest 1 - a / b over points, of means [2, points, n] of a and b."""
-    return _largest(1.0 - means[0] / means[1])
+    """1 - a / b at each point, of means [2, points, n] of a and b."""
+    return 1.0 - means[0] / means[1]
 
 
 def _highest_reward(claim: str, reward: dict[str, np.ndarray], over: str, figure: str) -> Judgement:
@@ -48,7 +40,7 @@ def _highest_reward(claim: str, reward: dict[str, np.ndarray], over: str, figure
         ">=",
         0.0,
         figure,
-        _smallest,
+        extreme=np.min,
     )
 
 
@@ -62,6 +54,7 @@ def _up_to(claim: str, paper: float, over: str, miss: dict[str, np.ndarray], oth
         paper,
         figure,
         _reduction,
+        np.max,
     )
 
 
@@ -128,7 +121,7 @@ def speed_claims(data: xr.Dataset) -> list[Judgement]:
                 ">=",
                 0.0,
                 figure,
-                _smallest,
+                extreme=np.min,
             )
             for label, metric, figure in (("throughput", packets, "6b"), ("miss detection", miss, "6c"))
             for name, sign in (("ddqn", 1.0), ("tlwd", -1.0))
@@ -158,7 +151,7 @@ def favourable_claims(data: xr.Dataset) -> list[Judgement]:
             "<=",
             0.0,
             "7a",
-            _largest,
+            extreme=np.max,
         ),
         judge(
             "C10 (DPR)",
@@ -188,7 +181,7 @@ def favourable_claims(data: xr.Dataset) -> list[Judgement]:
             ">=",
             0.0,
             "7a",
-            _smallest,
+            extreme=np.min,
         ),
         *(
             judge(
@@ -199,7 +192,7 @@ def favourable_claims(data: xr.Dataset) -> list[Judgement]:
                 ">=",
                 0.0,
                 figure,
-                _smallest,
+                extreme=np.min,
             )
             for label, metric, figure in (
                 ("throughput", "throughput", "7b"),
@@ -222,7 +215,7 @@ def density_claims(data: xr.Dataset) -> list[Judgement]:
             "<=",
             0.0,
             "8a",
-            _largest,
+            extreme=np.max,
         ),
         judge(
             "C13 (miss detection)",
@@ -232,7 +225,7 @@ def density_claims(data: xr.Dataset) -> list[Judgement]:
             ">=",
             0.0,
             "8c",
-            _smallest,
+            extreme=np.min,
         ),
         _highest_reward("C13 (highest)", reward, "omega", "8a"),
         _up_to("C14 (DPR)", 0.22, "omega", miss, "dpr", "8c"),

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 
 from jrcjax.hparams import HParams
 from jrcjax.presets import paper_params
+from sweeps.sources import SOURCE
 from sweeps.sweep import Sweep
 
 VARIANTS: dict[str, dict[str, float]] = {
@@ -38,5 +39,5 @@ ABLATION = Sweep(
     x_values=tuple(float(number) for number in range(len(VARIANTS))),
     params_at=lambda x, preset: paper_params("target", preset),
     hparams_at=hparams_at,
-    transfers=True,
+    source=SOURCE,
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from jrcjax.presets import paper_params
 from jrcjax.transfer import TARGET_LEARNERS
+from sweeps.sources import SOURCE
 from sweeps.sweep import Sweep
 
 FIG5B = Sweep(
@@ -13,5 +14,5 @@ FIG5B = Sweep(
     x_name="environment",
     x_values=(0.0,),
     params_at=lambda x, preset: paper_params("target", preset),
-    transfers=True,
+    source=SOURCE,
 )

@@ -6,6 +6,7 @@ import dataclasses
 
 from jrcjax.params import EnvParams
 from jrcjax.presets import paper_params
+from sweeps.sources import SOURCE
 from sweeps.sweep import Sweep
 
 
@@ -23,5 +24,5 @@ FIG6 = Sweep(
     x_name="high_speed_event_probability",
     x_values=(0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9),
     params_at=params_at,
-    transfers=True,
+    source=SOURCE,
 )

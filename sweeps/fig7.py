@@ -8,6 +8,7 @@ import jax.numpy as jnp
 
 from jrcjax.params import FACTORS, EnvParams
 from jrcjax.presets import paper_params
+from sweeps.sources import SOURCE
 from sweeps.sweep import Sweep
 
 
@@ -26,5 +27,5 @@ FIG7 = Sweep(
     x_name="favourable_probability",
     x_values=(0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9),
     params_at=params_at,
-    transfers=True,
+    source=SOURCE,
 )

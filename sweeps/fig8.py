@@ -6,6 +6,7 @@ import dataclasses
 
 from jrcjax.params import EnvParams
 from jrcjax.presets import paper_params, paper_radar
+from sweeps.sources import SOURCE
 from sweeps.sweep import Sweep
 
 
@@ -21,5 +22,5 @@ FIG8 = Sweep(
     x_name="density",
     x_values=(8.0, 12.0, 16.0, 20.0, 24.0, 28.0, 32.0, 36.0, 40.0),
     params_at=params_at,
-    transfers=True,
+    source=SOURCE,
 )

@@ -6,6 +6,7 @@ import jax.numpy as jnp
 
 from jrcjax.hparams import HParams
 from jrcjax.presets import paper_params
+from sweeps.sources import SOURCE
 from sweeps.sweep import Sweep
 
 
@@ -25,5 +26,5 @@ FIG9 = Sweep(
     x_values=(1.0, 0.0),
     params_at=lambda x, preset: paper_params("target", preset),
     hparams_at=hparams_at,
-    transfers=True,
+    source=SOURCE,
 )

@@ -139,18 +139,19 @@ def run_block(sweep: Sweep, size: Size, points: Points, seeds: range, source: So
       size: how much of it.
       points: its points.
       seeds: the seeds.
-      source: of the seeds, if the sweep transfers; every leaf has a leading axis of seeds.
+      source: of the seeds, if the sweep transfers; every leaf has leading axes of the source's points and of seeds.
     """
     chunk = chunk_of(size.episodes)
     spec = spec_of(jax.tree.map(lambda a: a[0], points.params))
-    program = program_of(sweep.learners, spec, size.config, chunk)
+    program = program_of(sweep.learners, spec, sweep.config(size), chunk)
     shape = (len(sweep.x_values), len(seeds))
     point, seed = (a.reshape(-1) for a in np.indices(shape))
     lanes = parallel.padded(point.size)
     keys = keys_of(np.array(seeds)[seed])
-    if sweep.transfers:
+    if sweep.source:
         keys = jax.vmap(target_key)(keys)
-    of_lane: Any = jax.tree.map(lambda leaf: leaf[seed], source)
+    source_point = np.array(sweep.source_points or [0] * shape[0])[point]
+    of_lane: Any = jax.tree.map(lambda leaf: leaf[source_point, seed], source)
     where = parallel.pad_agents(jnp.asarray(point), lanes)
     state = program.start(points, (*parallel.pad_agents((keys, of_lane), lanes), where)), where
     for first in range(0, size.episodes, chunk):

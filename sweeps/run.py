@@ -14,11 +14,9 @@ from jrcjax.episodes import Log
 from jrcjax.provenance import usable_cores
 from sweeps import estimate, store
 from sweeps.program import Points, Reference, points_of, reference_of, run_block
-from sweeps.sources import SOURCE, missing_sources, sources_of
+from sweeps.sources import missing_sources, sources_of
 from sweeps.sweep import Size, Sweep
 
-SEEDS_PER_PART = 16
-"""Seeds that share a part file."""
 _COLUMNS = (
     TextColumn("{task.description}"),
     BarColumn(),
@@ -28,15 +26,15 @@ _COLUMNS = (
 )
 
 
-def blocks(wanted: int, finished: set[int]) -> Iterator[range]:
-    """Blocks of consecutive seeds that are still to be run, none across a multiple of SEEDS_PER_PART."""
+def blocks(wanted: int, finished: set[int], per_part: int) -> Iterator[range]:
+    """Blocks of consecutive seeds that are still to be run, none across a multiple of `per_part`."""
     seed = 0
     while seed < wanted:
         if seed in finished:
             seed += 1
             continue
         stop = seed + 1
-        while stop < wanted and stop % SEEDS_PER_PART and stop not in finished:
+        while stop < wanted and stop % per_part and stop not in finished:
             stop += 1
         yield range(seed, stop)
         seed = stop
@@ -50,15 +48,15 @@ def to_do(sweep: Sweep, size: Size, out: Path) -> list[range]:
     """
     folder = out / sweep.name
     store.check_folder(folder, sweep, size)
-    return list(blocks(size.seeds, store.finished_seeds(folder)))
+    return list(blocks(size.seeds, store.finished_seeds(folder), sweep.seeds_per_part))
 
 
 def expected_seconds(sweeps: list[Sweep], size: Size, out: Path) -> float:
     """What these sweeps will take, with the source agents that they lack, as far as one can tell beforehand."""
     todo = {sweep: to_do(sweep, size, out) for sweep in sweeps}
-    transfers = {seeds for sweep in sweeps if sweep.transfers for seeds in todo[sweep]}
-    lacking = {missing_sources(size, seeds, out) for seeds in transfers}
-    agents = sum(estimate.block_seconds(SOURCE, size, len(seeds)) for seeds in lacking if seeds)
+    transfers = {(sweep.source, seeds) for sweep in sweeps if sweep.source for seeds in todo[sweep]}
+    lacking = {(source, missing_sources(source, size, seeds, out)) for source, seeds in transfers}
+    agents = sum(estimate.block_seconds(source, size, len(seeds)) for source, seeds in lacking if seeds)
     return agents + sum(estimate.block_seconds(sweep, size, len(seeds)) for sweep in sweeps for seeds in todo[sweep])
 
 
@@ -68,7 +66,7 @@ def run_sweep(sweep: Sweep, size: Size, out: Path, console: Console, *, resume: 
     Args:
       sweep: what to run.
       size: how much of it.
-      out: results go to `out / sweep.name`, source agents to `out / "source"`.
+      out: results go to `out / sweep.name`, source agents to the folder of `sweep.source`.
       console: where the expected time and the progress are shown.
       resume: continue in a folder that holds results of the same configuration.
 
@@ -117,7 +115,7 @@ def _run_block(
     advance: Callable[[float], None],
 ) -> None:
     """Runs one block of seeds and writes its part; `advance` is told how many of the expected seconds are done."""
-    source = sources_of(size, seeds, out, advance) if sweep.transfers else None
+    source = sources_of(sweep.source, size, seeds, out, advance) if sweep.source else None
     logs: list[dict[str, Log]] = []
     for chunk in run_block(sweep, size, points, seeds, source):
         if not logs:

@@ -23,7 +23,6 @@ from jrcjax.episodes import Log
 from jrcjax.exact import LongRun
 from jrcjax.hparams import HParams
 from jrcjax.params import EnvParams
-from jrcjax.presets import paper_params
 from jrcjax.provenance import provenance
 from sweeps.program import Reference, points_of
 from sweeps.sweep import Size, Sweep
@@ -53,10 +52,11 @@ def configuration(sweep: Sweep, size: Size) -> dict[str, Any]:
         "x": {sweep.x_name: sweep.x_values},
         "environments": digest_of(points.params),
         "hparams": {name: _plain(getattr(points.hparams, name)) for name in vars(HParams())},
-        "config": {name: value for name, value in asdict(size.config).items() if name != "episodes"},
+        "config": {name: value for name, value in asdict(sweep.config(size)).items() if name != "episodes"},
     }
-    if sweep.transfers:
-        found["source environment"] = digest_of(paper_params("source", size.preset))
+    if sweep.source:
+        found["source"] = configuration(sweep.source, size)
+        found["source points"] = sweep.source_points
     return json.loads(json.dumps(found))
 
 

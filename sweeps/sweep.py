@@ -27,8 +27,24 @@ class Sweep:
     """(x, preset) to the environment at a point."""
     hparams_at: Callable[[float], HParams] = lambda x: HParams()
     """x to the hyperparameters at a point."""
-    transfers: bool = False
-    """Whether each seed brings weights and demonstrations of a source agent of its own."""
+    source: Sweep | None = None
+    """What trains the source agents whose weights and demonstrations the learners take over: at each of its points,
+    one per seed."""
+    source_points: tuple[int, ...] = ()
+    """Number of the source's point at each point; the first everywhere if empty."""
+    optimiser: str = Config.optimiser  # pyright: ignore[reportAssignmentType]
+    """One of jrcjax.hparams.OPTIMISERS, of the learners and of the source agents' sweep alike."""
+    seeds_per_part: int = 16
+    """Seeds that share a part file. With few points more of them fill the blocks that devices work on."""
+
+    def config(self, size: Size) -> Config:
+        """Static settings of all learners."""
+        return Config(
+            episodes=size.episodes,
+            pretraining=size.pretraining,
+            demonstrations=size.demonstrations,
+            optimiser=self.optimiser,
+        )
 
 
 @dataclass(frozen=True)
@@ -53,11 +69,6 @@ class Size:
             if not isinstance(value, int) or isinstance(value, bool) or value < 1:
                 refuse(field, value if isinstance(value, int | float | str) else str(value), "an integer >= 1")
         choice("preset", self.preset, PRESETS)
-
-    @property
-    def config(self) -> Config:
-        """Static settings of all learners."""
-        return Config(episodes=self.episodes, pretraining=self.pretraining, demonstrations=self.demonstrations)
 
 
 SMOKE = Size(seeds=2, episodes=20, pretraining=200, demonstrations=1000)

@@ -15,11 +15,14 @@ from rich.console import Console
 import jrcjax
 from jrcjax import exact
 from jrcjax.provenance import provenance
+from jrcjax.source import train_source
+from jrcjax.training import train
+from jrcjax.transfer import target_key
 from sweeps import store
 from sweeps.__main__ import main
 from sweeps.program import chunk_of, points_of, reference_of
 from sweeps.registry import SWEEPS
-from sweeps.run import SEEDS_PER_PART, blocks, expected_seconds, run_sweep
+from sweeps.run import blocks, expected_seconds, run_sweep
 from sweeps.sources import SOURCE, missing_sources, sources_of
 from sweeps.sweep import SMOKE, Size, size_of
 
@@ -116,9 +119,9 @@ def test_missing_seeds_are_named(folder):
 
 def test_blocks_cover_what_is_missing_once_and_keep_to_the_grid():
     finished = {0, 1, 2, 17, 18}
-    todo = list(blocks(40, finished))
+    todo = list(blocks(40, finished, 16))
     assert sorted(seed for block in todo for seed in block) == sorted(set(range(40)) - finished)
-    assert all(block.start // SEEDS_PER_PART == (block.stop - 1) // SEEDS_PER_PART for block in todo)
+    assert all(block.start // 16 == (block.stop - 1) // 16 for block in todo)
 
 
 @pytest.mark.parametrize(("episodes", "chunk"), [(1000, 20), (20, 20), (7, 7), (53, 1), (96, 16)])
@@ -145,7 +148,7 @@ def compilations():
 def test_the_program_is_compiled_once_for_all_blocks(tmp_path):
     with compilations() as compiled:
         # Three blocks, with a number of episodes that no other test uses, so that nothing is compiled yet.
-        run_sweep(FIG5A, Size(seeds=2 * SEEDS_PER_PART + 1, episodes=3), tmp_path, QUIET, resume=False)
+        run_sweep(FIG5A, Size(seeds=2 * FIG5A.seeds_per_part + 1, episodes=3), tmp_path, QUIET, resume=False)
     assert compiled.count("jit(checked)") == 2  # one program starts the agents, one advances them
 
 
@@ -223,34 +226,60 @@ def test_a_seed_of_a_transfer_sweep_is_a_single_run_of_that_key(pair, point, x):
     data = store.load(pair, TINY.seeds)
     key = jax.random.fold_in(jax.random.key(0), 1)
     source, target = jrcjax.paper_params("source"), PAIR.params_at(x, "paper")
-    alone = jrcjax.transfer(key, source, target, PAIR.hparams_at(x), config=TINY.config, learners=PAIR.learners)
+    alone = jrcjax.transfer(key, source, target, PAIR.hparams_at(x), config=PAIR.config(TINY), learners=PAIR.learners)
     for learner in PAIR.learners:
         swept = data.sel(algorithm=learner, seed=1).isel(point=point)
         for name in ("reward", "throughput", "miss_detection", "policy_reward"):
             # Batched and single programs round differently, which 600 slots of training do not amplify beyond this.
             np.testing.assert_allclose(swept[name].values, getattr(alone.logs[learner], name), rtol=1e-4)
-    kept = sources_of(TINY, range(2), pair.parent, lambda seconds: None)
+    kept = sources_of(SOURCE, TINY, range(2), pair.parent, lambda seconds: None)
     for held, wanted in zip(jax.tree.leaves(kept), jax.tree.leaves(alone.source), strict=True):
-        np.testing.assert_allclose(held[1], wanted, rtol=1e-4, atol=1e-5)
+        np.testing.assert_allclose(held[0, 1], wanted, rtol=1e-4, atol=1e-5)
 
 
 def test_source_agents_are_trained_once_for_all_sweeps(pair):
     part = store.part_path(pair.parent / "source", range(0, 2))
     before = part.read_bytes()
-    assert missing_sources(TINY, range(2), pair.parent) == range(0)
-    assert missing_sources(TINY, range(4), pair.parent) == range(2, 4)
+    assert missing_sources(SOURCE, TINY, range(2), pair.parent) == range(0)
+    assert missing_sources(SOURCE, TINY, range(4), pair.parent) == range(2, 4)
     run_sweep(replace(PAIR, name="other", learners=("dpr",)), TINY, pair.parent, QUIET, resume=False)
     assert part.read_bytes() == before
     assert [path.name for path in (pair.parent / "source").glob("*.nc")] == [part.name]
 
 
 def test_sources_come_back_from_disk_as_they_were(pair):
-    trained = sources_of(TINY, range(2), pair.parent, lambda seconds: None)
-    some = sources_of(TINY, range(1, 2), pair.parent, lambda seconds: None)
-    assert trained.demonstrations.state.shape == (2, 70)
-    jax.tree.map(lambda whole, part: np.testing.assert_array_equal(whole[1:], part), trained, some)
+    trained = sources_of(SOURCE, TINY, range(2), pair.parent, lambda seconds: None)
+    some = sources_of(SOURCE, TINY, range(1, 2), pair.parent, lambda seconds: None)
+    assert trained.demonstrations.state.shape == (1, 2, 70)
+    jax.tree.map(lambda whole, part: np.testing.assert_array_equal(whole[:, 1:], part), trained, some)
     for a, b in zip(trained.demonstrations, some.demonstrations, strict=True):
         assert a.dtype == b.dtype
+
+
+def test_a_source_of_several_points_hands_on_what_is_trained_at_each(tmp_path):
+    two = replace(
+        SOURCE,
+        name="two",
+        x_values=(0.0, 1.0),
+        params_at=lambda x, preset: jrcjax.paper_params("source", "paper_table" if x else preset),
+        optimiser="sgd",
+    )
+    found = sources_of(two, TINY, range(2), tmp_path, lambda seconds: None)
+    key = jax.random.fold_in(jax.random.key(0), 1)
+    for point, params in enumerate(two.params_at(x, "paper") for x in two.x_values):
+        alone, _ = train_source(key, params, two.hparams_at(0.0), two.config(TINY))
+        for held, wanted in zip(jax.tree.leaves(found), jax.tree.leaves(alone), strict=True):
+            np.testing.assert_allclose(held[point, 1], wanted, rtol=1e-4, atol=1e-5)
+    # The learners at a point take over the source that the sweep names for it.
+    sweep = replace(PAIR, name="crossed", learners=("dpr",), source=two, source_points=(1, 0), optimiser="sgd")
+    run_sweep(sweep, TINY, tmp_path, QUIET, resume=False)
+    data = store.load(tmp_path / "crossed", 2)
+    for point, x in enumerate(sweep.x_values):
+        source = jax.tree.map(lambda leaf: leaf[1 - point, 1], found)  # noqa: B023
+        config = sweep.config(TINY)
+        log = train(target_key(key), sweep.params_at(x, "paper"), learner="dpr", config=config, source=source)[1]
+        swept = data["policy_reward"].isel(algorithm=0, point=point, seed=1).values
+        np.testing.assert_allclose(swept, log.policy_reward, rtol=1e-4)
 
 
 def test_sources_of_another_configuration_are_refused(pair):
@@ -263,11 +292,11 @@ def test_hyperparameters_of_points_are_part_of_the_configuration():
     assert found["hparams"]["priority_exponent"] == [0.4, 0.0]
     assert found["hparams"]["discount"] == 0.99
     assert found["config"]["pretraining"] == 12
-    assert found["source environment"] == store.configuration(SOURCE, TINY)["environments"]
+    assert found["source"] == store.configuration(SOURCE, TINY)
 
 
 def test_a_transfer_sweep_compiles_once_for_all_blocks(tmp_path):
-    size = replace(TINY, seeds=2 * SEEDS_PER_PART, episodes=1, pretraining=3)
+    size = replace(TINY, seeds=2 * FIG5A.seeds_per_part, episodes=1, pretraining=3)
     with compilations() as compiled:
         run_sweep(replace(PAIR, learners=("tlwd", "dpr")), size, tmp_path, QUIET, resume=False)
     # Source agents start, advance and demonstrate; the sweep's agents start and advance.
@@ -300,7 +329,7 @@ def test_points_are_what_the_paper_varies(name):
     for field, leaf in by_name(params).items():
         if field not in varied and field not in derived:
             np.testing.assert_array_equal(leaf, np.broadcast_to(wanted[field], leaf.shape))
-    assert sweep.transfers == (name != "fig5a")
+    assert (sweep.source is None) == (name == "fig5a")
 
 
 def test_the_expected_time_grows_with_the_work_and_is_nothing_for_nothing(tmp_path):
