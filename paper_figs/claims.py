@@ -15,11 +15,6 @@ import xarray as xr
 
 from paper_figs.statistics import Statistic, bootstrap
 
-TOLERANCE = 0.05
-"""A policy within this gap of the optimum counts as having reached it."""
-WINDOW = 20
-"""Episodes over which the gap must stay within the tolerance on average."""
-
 
 @dataclass(frozen=True)
 class Judgement:
@@ -72,30 +67,6 @@ def judge(
     value, low, high = bootstrap(values, statistic, extreme)
     verdict = verdict_of(low, high, relation, limit)
     return Judgement(claim, statement, effect, relation, limit, value, low, high, verdict, len(values), figure)
-
-
-def gaps(data: xr.Dataset, algorithm: str, point: int = 0) -> np.ndarray:
-    """Relative gap to the optimum of the policy after each episode, [seeds, episodes].
-
-    It is (optimum - reward) / |optimum| with the exact long-run reward of the policy without exploration.
-    """
-    optimum = float(data["optimum_reward"].isel(point=point))
-    reward = data["policy_reward"].sel(algorithm=algorithm).isel(point=point).transpose("seed", "episode").values
-    return (optimum - reward) / abs(optimum)
-
-
-def convergence_episode(data: xr.Dataset, algorithm: str, point: int = 0) -> np.ndarray:
-    """First episode from which the gap averages at most TOLERANCE over WINDOW episodes, [seeds].
-
-    Where that never happens it is the number of episodes, so that the mean is the restricted mean.
-    """
-    gap = gaps(data, algorithm, point)
-    episodes = gap.shape[1]
-    if episodes < WINDOW:
-        return np.full(len(gap), np.nan)
-    means = np.lib.stride_tricks.sliding_window_view(gap, WINDOW, axis=1).mean(axis=2)
-    reached = means <= TOLERANCE
-    return np.where(reached.any(axis=1), reached.argmax(axis=1) + 1, episodes).astype(float)
 
 
 def first(data: xr.Dataset, metric: str, algorithm: str, episodes: int | None = None) -> np.ndarray:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from paper_figs.claims import TOLERANCE, Judgement, convergence_episode, first, gaps, judge
+from paper_figs.claims import Judgement, first, judge
+from paper_figs.convergence import TOLERANCE, convergence_episode, gaps
 
 _EARLY = 100  # episodes of which the paper compares the beginning
 

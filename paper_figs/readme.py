@@ -19,7 +19,8 @@ from jrcjax.hparams import Config, HParams
 from jrcjax.presets import paper_params
 from jrcjax.transfer import transfer
 from paper_figs.__main__ import results_folder
-from paper_figs.claims import TOLERANCE, convergence_episode, first, gaps
+from paper_figs.claims import first
+from paper_figs.convergence import TOLERANCE, convergence_episode, gaps
 from paper_figs.figures import FIGURES
 from paper_figs.learning_claims import source_claims
 from sweeps import store

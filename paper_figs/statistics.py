@@ -56,6 +56,15 @@ def mean_over_seeds(values: np.ndarray, confidence: float = CONFIDENCE) -> Mean:
     return Mean(mean, mean - half, mean + half, n)
 
 
+def proportion(count: np.ndarray | int, n: int) -> Mean:
+    """Shares `count` / n with Wilson's 95 % interval, which holds at 0 and 1, too."""
+    z = stats.norm.ppf((1 + CONFIDENCE) / 2)
+    share = np.asarray(count) / n
+    centre = (share + z**2 / (2 * n)) / (1 + z**2 / n)
+    half = z / (1 + z**2 / n) * np.sqrt(share * (1 - share) / n + z**2 / (4 * n**2))
+    return Mean(share, np.maximum(centre - half, 0.0), np.minimum(centre + half, 1.0), n)
+
+
 @functools.lru_cache(maxsize=8)
 def _weights(n: int, seed: int, stratum: int) -> np.ndarray:
     """How often each of n seeds is in each resample, as shares, [n, RESAMPLES]."""

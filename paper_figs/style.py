@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import NamedTuple, ParamSpec
 
 import matplotlib as mpl
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
 
 P = ParamSpec("P")
@@ -86,3 +87,11 @@ def save(figure: Figure, path: Path) -> list[Path]:
             figure.savefig(target, metadata=metadata)
             written.append(target)
     return written
+
+
+def save_pages(figures: Iterable[Figure], path: Path) -> Path:
+    """Writes one PDF with a page for each figure; the same figures give the same bytes."""
+    with mpl.rc_context(fname=STYLE), PdfPages(path, metadata={"CreationDate": None, "Producer": None}) as pages:
+        for figure in figures:
+            pages.savefig(figure)
+    return path

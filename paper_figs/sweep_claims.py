@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from paper_figs.claims import Judgement, convergence_episode, first, judge
+from paper_figs.claims import Judgement, first, judge
+from paper_figs.convergence import convergence_episode
 
 _LABELS = {"tlwd": "TLwD", "dpr": "DPR", "ddqn": "DDQN"}
 

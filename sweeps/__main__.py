@@ -20,14 +20,14 @@ class List:
 
 @dataclass(frozen=True)
 class Run:
-    """Run one sweep; results go to OUT/NAME."""
+    """Run one sweep or study; results go to OUT/NAME, with what a study concludes in OUT/NAME/summary."""
 
     name: tyro.conf.Positional[str]
-    """A sweep's name, as `list` shows it."""
+    """A sweep's or study's name, as `list` shows it."""
     seeds: int | None = None
-    """Independent seeds. Default: 10, or 2 with --smoke."""
+    """Independent seeds. Default: 10 (multiverse 4), or 2 with --smoke."""
     episodes: int | None = None
-    """Episodes per seed. Default: 1000, or 20 with --smoke."""
+    """Episodes per seed. Default: 1000 (multiverse 500), or 20 with --smoke."""
     preset: str = "paper"
     """Table of parameters: paper or paper_table."""
     out: Path = Path("out/results")
@@ -49,22 +49,27 @@ def main(args: list[str] | None = None) -> int:
 
     parallel.use_all_cores()
     parallel.keep_compiled()
-    from sweeps.registry import SWEEPS
+    from paper_figs.studies import SUMMARIES
+    from sweeps.registry import STUDIES
     from sweeps.run import run_sweep
 
     console = Console(stderr=True)
     if isinstance(command, List):
-        for sweep in SWEEPS.values():
-            print(f"{sweep.name:12s} {sweep.description}")
+        for study in STUDIES.values():
+            print(f"{study.name:12s} {study.description}")
         return 0
     try:
-        choice("name", command.name, tuple(SWEEPS))
-        size = size_of(command.seeds, command.episodes, command.preset, command.smoke)
-        folder = run_sweep(SWEEPS[command.name], size, command.out, console, resume=command.resume)
+        choice("name", command.name, tuple(STUDIES))
+        study = STUDIES[command.name]
+        size = size_of(command.seeds, command.episodes, command.preset, command.smoke, study)
+        sweeps = study.smoke_sweeps if command.smoke and study.smoke_sweeps else study.sweeps
+        written = [run_sweep(sweep, size, command.out, console, resume=command.resume) for sweep in sweeps]
+        if study.name in SUMMARIES:
+            written += SUMMARIES[study.name](sweeps, size, command.out)
     except (ValueError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
-    print(folder)
+    print("\n".join(map(str, written)))
     return 0
 
 

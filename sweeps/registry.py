@@ -1,4 +1,4 @@
-"""All sweeps by name."""
+"""All sweeps and studies by name."""
 
 from __future__ import annotations
 
@@ -9,6 +9,12 @@ from sweeps.fig6 import FIG6
 from sweeps.fig7 import FIG7
 from sweeps.fig8 import FIG8
 from sweeps.fig9 import FIG9
-from sweeps.sweep import Sweep
+from sweeps.multiverse import MULTIVERSE
+from sweeps.robustness import ROBUSTNESS
+from sweeps.sweep import Study, Sweep
 
 SWEEPS: dict[str, Sweep] = {sweep.name: sweep for sweep in (FIG5A, FIG5B, FIG6, FIG7, FIG8, FIG9, ABLATION)}
+"""Those of one figure or table each."""
+STUDIES: dict[str, Study] = {sweep.name: Study(sweep.name, sweep.description, (sweep,)) for sweep in SWEEPS.values()}
+STUDIES |= {study.name: study for study in (ROBUSTNESS, MULTIVERSE)}
+"""All that `python -m sweeps run` takes."""

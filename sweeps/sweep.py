@@ -75,8 +75,23 @@ SMOKE = Size(seeds=2, episodes=20, pretraining=200, demonstrations=1000)
 """The tiny version of every sweep."""
 
 
-def size_of(seeds: int | None, episodes: int | None, preset: str, smoke: bool) -> Size:
+@dataclass(frozen=True)
+class Study:
+    """What a name on the command line stands for: sweeps that run one after the other and are evaluated together."""
+
+    name: str
+    description: str
+    sweeps: tuple[Sweep, ...]
+    size: Size = Size()
+    """Unless the command line says otherwise."""
+    smoke_sweeps: tuple[Sweep, ...] | None = None
+    """What the tiny version runs instead of `sweeps`."""
+    smoke_size: Size = SMOKE
+
+
+def size_of(seeds: int | None, episodes: int | None, preset: str, smoke: bool, study: Study | None = None) -> Size:
     """The size that command-line options ask for."""
-    size = replace(SMOKE if smoke else Size(), preset=preset)
+    usual, tiny = (study.size, study.smoke_size) if study else (Size(), SMOKE)
+    size = replace(tiny if smoke else usual, preset=preset)
     given = {"seeds": seeds, "episodes": episodes}
     return replace(size, **{name: value for name, value in given.items() if value is not None})

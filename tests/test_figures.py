@@ -11,7 +11,7 @@ import xarray as xr
 from scipy import stats
 
 from jrcjax import Log
-from paper_figs import claims, curves, learning_claims, points, statistics, style, sweep_claims
+from paper_figs import claims, convergence, curves, learning_claims, points, statistics, style, sweep_claims
 from paper_figs.__main__ import main
 from paper_figs.figures import FIGURES
 
@@ -345,11 +345,11 @@ def test_claims_on_the_target_in_true_and_false_worlds(true):
 def test_convergence_is_the_first_episode_of_a_window_within_the_tolerance():
     data = speed_world(true=True)
     # The window from episode e on averages 5 % or less once 9 % of it, one episode of 20, still has the gap of 50 %.
-    fast = claims.convergence_episode(data, "tlwd", 3)
+    fast = convergence.convergence_episode(data, "tlwd", 3)
     np.testing.assert_array_equal(fast, 11 - 1)
-    np.testing.assert_array_equal(claims.convergence_episode(data, "ddqn", 3), 401 - 1)
+    np.testing.assert_array_equal(convergence.convergence_episode(data, "ddqn", 3), 401 - 1)
     never = data.assign(policy_reward=data["policy_reward"] * 0)
-    np.testing.assert_array_equal(claims.convergence_episode(never, "ddqn"), 600)
+    np.testing.assert_array_equal(convergence.convergence_episode(never, "ddqn"), 600)
 
 
 def test_points_table_holds_means_over_episodes_and_seeds_and_the_exact_lines():

@@ -12,6 +12,7 @@ ROOT = Path(__file__).parents[1]
 ENVIRONMENT = {"slot", "environment", "exact"}
 # What puts the parts together; modules of the package that are in none of these sets hold equations.
 TRAINING = {"__init__", "training", "parallel", "episodes", "source", "transfer", "adapters"}
+# A command may use everything.
 LEVELS = ("equations", "environment", "learners", "training", "sweeps", "paper_figs")
 
 
@@ -21,6 +22,8 @@ def module_of(path: Path) -> str:
 
 def level(module: str) -> int:
     parts = module.split(".")
+    if parts[-1] == "__main__":
+        return len(LEVELS)
     if parts[0] != "jrcjax":
         return LEVELS.index(parts[0])
     name = parts[1] if len(parts) > 1 else "__init__"
