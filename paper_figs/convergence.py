@@ -64,14 +64,14 @@ class SampleComplexity(NamedTuple):
 def sample_complexity(data: xr.Dataset, algorithm: str, point: int = 0) -> SampleComplexity:
     """What it takes to get within TOLERANCE of the optimum, in runs of at least WINDOW episodes."""
     converged = convergence_episode(data, algorithm, point)
-    ever = _within(gaps(data, algorithm, point)).any(axis=1)
+    ever = np.any(_within(gaps(data, algorithm, point)), axis=1)
     episodes = np.unique(converged[ever])
-    share = proportion((converged[ever] <= episodes[:, None]).sum(axis=1), len(ever))
+    share = proportion((converged[ever] <= episodes[:, None]).sum(axis=1), len(converged))
     half = share.mean >= 0.5
     return SampleComplexity(
         episodes=episodes,
         share=share,
-        reached=Interval(*(float(limit) for limit in proportion(ever.sum(), len(ever))[:3])),
+        reached=Interval(*(float(limit) for limit in proportion(ever.sum(), len(converged))[:3])),
         median=float(episodes[half.argmax()]) if half.any() else float("nan"),
         restricted_mean=bootstrap(converged),
     )

@@ -95,8 +95,8 @@ def main_effects(found: pd.DataFrame) -> pd.DataFrame:
     for claim, of_claim in found.groupby("claim", sort=False):
         holds = of_claim["holds"].to_numpy(float)
         shuffled = np.random.default_rng(0).permuted(np.tile(holds, (_SHUFFLES, 1)), axis=1)
-        for reading in Universe._fields:
-            levels = [level for level in map(level_name, getattr(LEVELS, reading)) if level in set(of_claim[reading])]
+        for reading in LEVELS:
+            levels = [level for level in map(level_name, LEVELS[reading]) if level in set(of_claim[reading])]
             member = np.stack([(of_claim[reading] == level).to_numpy() for level in levels])
             shares = (shuffled @ member.T) / member.sum(axis=1)
             chance = float(np.quantile(np.ptp(shares, axis=1), CONFIDENCE))
@@ -112,13 +112,15 @@ def shares(found: pd.DataFrame, effects: pd.DataFrame) -> pd.DataFrame:
     """One row per claim: the share of universes with each verdict, the verdict in the first, and what decides it."""
     rows = []
     for claim, of_claim in found.groupby("claim", sort=False):
-        deciding = effects[(effects.claim == claim) & (effects.range > effects.chance)]
-        ranges = deciding.groupby("reading", sort=False)["range"].first().sort_values(ascending=False)
+        deciding = effects.query(f"claim == {claim!r} and range > chance").drop_duplicates("reading")
+        ranges = deciding.sort_values("range", ascending=False)
         row: dict[str, Any] = {"claim": claim, "universes": len(of_claim)}
         row |= {verdict: float((of_claim.verdict == verdict).mean()) for verdict in VERDICTS}
         row["holds"] = float(of_claim.holds.mean())
         row["default"] = of_claim.loc[of_claim.universe == 0, "verdict"].item()
-        row["decided_by"] = "; ".join(f"{reading} ({share:.2f})" for reading, share in ranges.items())
+        row["decided_by"] = "; ".join(
+            f"{reading} ({share:.2f})" for reading, share in zip(ranges.reading, ranges.range, strict=True)
+        )
         rows.append(row)
     return pd.DataFrame(rows)
 
@@ -158,7 +160,7 @@ def draw_shares(table: pd.DataFrame, n_seeds: int) -> Figure:
 @style.styled
 def draw_specification(found: pd.DataFrame, claim: str) -> Figure:
     """Specification curve of a claim: its effect in every universe in ascending order, and the readings below."""
-    ordered = found[found.claim == claim].sort_values("value", ignore_index=True)
+    ordered = found.query(f"claim == {claim!r}").sort_values("value", ignore_index=True)
     figure = Figure(figsize=(style.TWO_COLUMNS[0], 4.8))
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(1, 1.6))
     for verdict in VERDICTS:
@@ -173,7 +175,7 @@ def draw_specification(found: pd.DataFrame, claim: str) -> Figure:
     top.legend(ncols=4, loc="best")
     top.set_title(f"{claim}: {len(ordered)} universes, {ordered.n_seeds[0]} seeds, bars: 95 % intervals")
     ticks: dict[float, str] = {}
-    for number, (reading, levels) in enumerate(LEVELS._asdict().items()):
+    for number, (reading, levels) in enumerate(LEVELS.items()):
         for level in map(level_name, levels):
             row = -(len(ticks) + 0.5 * number)  # half a row between readings
             ticks[row] = f"{reading}: {level}".replace("_", " ")

@@ -156,10 +156,10 @@ def draw(found: dict[str, pd.DataFrame]) -> Figure:
     figure = Figure(figsize=(style.TWO_COLUMNS[0], 2.1 * len(environments) + 0.5))
     rows = figure.subplots(len(environments), 3, squeeze=False)
     for axes, environment in zip(rows, environments, strict=True):
-        here = profile[profile.environment == environment]
+        here = profile.query(f"environment == {environment!r}")
         for name, look in ((name, style.LOOKS[name]) for name in _RIVALS):
-            final = here[(here.algorithm == name) & (here.profile == "gap")]
-            soon = here[(here.algorithm == name) & (here.profile == "converged")]
+            final = here.query(f"algorithm == {name!r} and profile == 'gap'")
+            soon = here.query(f"algorithm == {name!r} and profile == 'converged'")
             for panel, curve, scale in ((axes[0], final, 100), (axes[1], soon, 1)):
                 if not curve.empty:
                     line = {"color": look.color, "label": look.label, "marker": look.marker, "markevery": 0.2}
@@ -177,7 +177,7 @@ def draw(found: dict[str, pd.DataFrame]) -> Figure:
         lines = ("-", "--", "-.", ":")
         ranked = ("reward", "throughput", "miss_detection", "convergence episode")
         for label, line in zip(ranked, lines, strict=True):
-            curve = wrong[(wrong.environment == environment) & (wrong.score == label)]
+            curve = wrong.query(f"environment == {environment!r} and score == {label!r}")
             axes[2].plot(
                 curve.study_seeds, curve.misranking, line, marker="o", color="black", label=label.replace("_", " ")
             )

@@ -52,17 +52,17 @@ class Universe(NamedTuple):
     """Of TLwD."""
 
 
-LEVELS = Universe(
-    event_model=EVENT_MODELS,
-    low_speed_event_probability=(0.005, 0.05),
-    miss_convention=MISS_CONVENTIONS,
-    resolution=(("footprint_gap", "resolved"), ("centre_to_centre", "resolved"), ("footprint_gap", "clusters")),
-    time_limit=("truncation", "terminal"),
-    epsilon_episodes=(100, 50, 400),
+LEVELS: dict[str, tuple[Any, ...]] = {
+    "event_model": EVENT_MODELS,
+    "low_speed_event_probability": (0.005, 0.05),
+    "miss_convention": MISS_CONVENTIONS,
+    "resolution": (("footprint_gap", "resolved"), ("centre_to_centre", "resolved"), ("footprint_gap", "clusters")),
+    "time_limit": ("truncation", "terminal"),
+    "epsilon_episodes": (100, 50, 400),
     # Plain gradient descent diverges from 1e-4 on: values are near 500, and so are its first errors.
-    optimiser=(Optimiser("adam", 1e-3), Optimiser("adam", 1e-4), Optimiser("rmsprop", 1e-3), Optimiser("sgd", 1e-5)),
-    initial_weights=INITIAL_WEIGHTS,
-)  # pyright: ignore[reportArgumentType]
+    "optimiser": (Optimiser("adam", 1e-3), Optimiser("adam", 1e-4), Optimiser("rmsprop", 1e-3), Optimiser("sgd", 1e-5)),
+    "initial_weights": INITIAL_WEIGHTS,
+}
 """The levels of each reading."""
 
 
@@ -81,7 +81,7 @@ def orthogonal_array() -> np.ndarray:
 
 
 UNIVERSES: tuple[Universe, ...] = tuple(
-    Universe(*(levels[i] for levels, i in zip(LEVELS, row, strict=True))) for row in orthogonal_array()
+    Universe(*(levels[i] for levels, i in zip(LEVELS.values(), row, strict=True))) for row in orthogonal_array()
 )
 """Those of the array."""
 
@@ -120,12 +120,15 @@ def read_as(params: EnvParams, universe: Universe) -> EnvParams:
 
 @functools.cache
 def _radar(density: float, distance: str, rule: str) -> Radar:
-    """The radar under a reading; its bank takes a second to draw, and universes share it."""
+    """The radar under a reading; its bank takes seconds to draw, and universes share it."""
+    radar = fig8.params_at(density, "paper").radar
+    if (distance, rule) == LEVELS["resolution"][0]:
+        return radar
     readings = {
         "distance": jnp.int32(choice("distance", distance, DISTANCES)),
         "counting_rule": jnp.int32(choice("counting_rule", rule, COUNTING_RULES)),
     }
-    return fig8.params_at(density, "paper").radar.replace(**readings)  # pyright: ignore
+    return radar.replace(**readings)  # pyright: ignore[reportAttributeAccessIssue]
 
 
 def hparams_of(hparams: HParams, universe: Universe) -> HParams:
