@@ -24,7 +24,7 @@ from jrcjax.source import source_of
 from sweeps import files, store
 from sweeps.estimate import seconds_per_episode
 from sweeps.parts import parts_of
-from sweeps.program import keys_of, points_of, reference_of, run_block
+from sweeps.program import joined, keys_of, points_of, reference_of, run_block
 from sweeps.sweep import Size, Sweep
 
 SOURCE = Sweep(
@@ -77,15 +77,16 @@ def sources_of(size: Size, seeds: range, out: Path, advance: Callable[[float], N
 def _trained(size: Size, seeds: range, advance: Callable[[float], None]) -> xr.Dataset:
     points = points_of(SOURCE, size.preset)
     logs: list[Any] = []
-    agents: Any = None
+    groups: Any = None
     for chunk in run_block(SOURCE, size, points, seeds, None):
         logs.append(chunk.log)
-        agents = chunk.agents["ddqn"]
+        groups = chunk.groups
         advance(chunk.episodes * seconds_per_episode(SOURCE, len(seeds)))
     log = jax.tree.map(lambda *parts: np.concatenate(parts, axis=-1), *logs)
     hand_on = _hand_on(size.config, size.preset)
-    keys = parallel.pad_agents(keys_of(np.array(seeds)), parallel.padded(len(seeds)))
-    source = jax.tree.map(lambda leaf: leaf[: len(seeds)], hand_on(points, (keys, agents.learner)))
+    keys = parallel.groups(keys_of(np.array(seeds)))
+    lanes = [(key, group["ddqn"].learner) for key, group in zip(keys, groups, strict=True)]
+    source = jax.tree.map(lambda leaf: leaf[: len(seeds)], joined([hand_on(points, group) for group in lanes]))
     return store.dataset(SOURCE, size, seeds, log, reference_of(points, size.episodes)).assign(_variables(source))
 
 
