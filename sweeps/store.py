@@ -103,10 +103,16 @@ def _differing(there: dict[str, Any], wanted: dict[str, Any], prefix: str = "") 
 
 
 def dataset(sweep: Sweep, size: Size, seeds: range, log: dict[str, Log], exact: Reference) -> xr.Dataset:
-    """Results of some seeds with named dimensions: algorithm, point, seed, episode (from 1)."""
+    """Results of some seeds with named dimensions: algorithm, point, seed, episode (from 1).
+
+    `first_diverged` is the first episode after which an agent's values had diverged, -1 if there is none.
+    """
     dims = ("algorithm", "point", "seed", "episode")
     stacked = {name: np.stack([getattr(log[learner], name) for learner in sweep.learners]) for name in Log._fields}
+    diverged = stacked.pop("diverged")
+    first = np.where(diverged.any(axis=-1), diverged.argmax(axis=-1) + 1, -1)
     variables: dict[str, Any] = {name: (dims, values) for name, values in stacked.items()}
+    variables["first_diverged"] = (dims[:-1], first)
     for policy in Reference._fields:
         run: LongRun = getattr(exact, policy)
         values = {name: np.asarray(value) for name, value in run._asdict().items()}
