@@ -69,12 +69,22 @@ def sources_of(size: Size, seeds: range, out: Path, advance: Callable[[float], N
         # Sweeps that run at the same time share the folder: one trains, the others wait for its agents.
         with files.locked(folder, lambda held: print(f"{held}; waiting for its agents", file=sys.stderr)):
             if missing := missing_sources(size, seeds, out):
-                store.write_part(folder, missing, _trained(size, missing, advance))
+                store.write_part(folder, missing, trained(size, missing, advance)[1])
             store.write_manifest(folder)
     return _load(size, seeds, folder)
 
 
-def _trained(size: Size, seeds: range, advance: Callable[[float], None]) -> xr.Dataset:
+def trained(size: Size, seeds: range, advance: Callable[[float], None]) -> tuple[Source, xr.Dataset]:
+    """Trains the source agents of some seeds.
+
+    Args:
+      size: the preset and lengths of the runs.
+      seeds: the seeds.
+      advance: told how many of the expected seconds are done.
+
+    Returns:
+      Weights and demonstrations, every leaf with a leading axis of seeds, and what is kept of them on disk.
+    """
     points = points_of(SOURCE, size.preset)
     logs: list[Any] = []
     groups: Any = None
@@ -87,7 +97,8 @@ def _trained(size: Size, seeds: range, advance: Callable[[float], None]) -> xr.D
     keys = parallel.groups(keys_of(np.array(seeds)))
     lanes = [(key, group["ddqn"].learner) for key, group in zip(keys, groups, strict=True)]
     source = jax.tree.map(lambda leaf: leaf[: len(seeds)], joined([hand_on(points, group) for group in lanes]))
-    return store.dataset(SOURCE, size, seeds, log, reference_of(points, size.episodes)).assign(_variables(source))
+    data = store.dataset(SOURCE, size, seeds, log, reference_of(points, size.episodes))
+    return source, data.assign(_variables(source))
 
 
 @functools.cache

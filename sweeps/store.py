@@ -29,8 +29,8 @@ from sweeps.program import Reference, points_of
 from sweeps.sweep import Size, Sweep
 
 __all__ = [
-    "MANIFEST", "ConfigurationMismatch", "check_folder", "configuration", "dataset", "digest_of", "finished_seeds",
-    "load", "part_path", "write_manifest", "write_part",
+    "MANIFEST", "ConfigurationMismatch", "check_configuration", "check_folder", "configuration", "dataset", "digest_of",
+    "finished_seeds", "load", "part_path", "write_manifest", "write_part",
 ]  # fmt: skip
 
 MANIFEST = "manifest.json"
@@ -82,12 +82,21 @@ def check_folder(folder: Path, sweep: Sweep, size: Size) -> None:
     for part in parts:
         if part.configuration.get("sweep") != sweep.name:
             files.set_aside(part.path, f"it is of the sweep {part.configuration.get('sweep')!r}")
-            continue
-        if differing := _differing(part.configuration, wanted):
-            raise ConfigurationMismatch(
-                f"{part.path} holds results of another configuration ({'; '.join(differing)}); "
-                "choose another --out, or remove the folder"
-            )
+        else:
+            check_configuration(part, wanted)
+
+
+def check_configuration(part: Part, wanted: dict[str, Any]) -> None:
+    """Refuses a part of another configuration than `wanted`.
+
+    Raises:
+      ConfigurationMismatch: naming each field that differs, with both values.
+    """
+    if differing := _differing(part.configuration, wanted):
+        raise ConfigurationMismatch(
+            f"{part.path} holds results of another configuration ({'; '.join(differing)}); "
+            "choose another --out, or remove the folder"
+        )
 
 
 def _differing(there: dict[str, Any], wanted: dict[str, Any], prefix: str = "") -> list[str]:
