@@ -9,7 +9,7 @@ import pandas as pd
 import xarray as xr
 from matplotlib.figure import Figure
 
-from paper_figs import style
+from paper_figs import divergence, style
 from paper_figs.claims import Judgement
 from paper_figs.learning_claims import replay_claims, source_claims, target_claims
 from paper_figs.statistics import CONFIDENCE
@@ -76,10 +76,18 @@ def verdicts(
     for name, (source, target) in results.items():
         for number, universe in enumerate(universes[name]):
             points = slice(number * len(POINTS), (number + 1) * len(POINTS))
-            for c in claims_of(source.isel(point=[number]), target.isel(point=points)):
+            here = source.isel(point=[number]), target.isel(point=points)
+            n_diverged = sum(divergence.count(data, name) for data in here for name in data["algorithm"].values)
+            for c in claims_of(*here):
                 holds = c.value >= c.limit if c.relation == ">=" else c.value <= c.limit
                 known = {"claim": c.claim, "value": c.value, "ci_low": c.ci_low, "ci_high": c.ci_high, "limit": c.limit}
-                about = {"relation": c.relation, "verdict": c.verdict, "holds": holds, "n_seeds": c.n_seeds}
+                about = {
+                    "relation": c.relation,
+                    "verdict": c.verdict,
+                    "holds": holds,
+                    "n_seeds": c.n_seeds,
+                    "n_diverged": n_diverged,
+                }
                 rows.append({"universe": UNIVERSES.index(universe)} | readings_of(universe) | known | about)
     return pd.DataFrame(rows)
 

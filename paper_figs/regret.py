@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from paper_figs import divergence
 from paper_figs.convergence import WINDOW, sample_complexity
 from paper_figs.statistics import mean_over_seeds
 
@@ -47,6 +48,7 @@ def table(data: xr.Dataset, figure: str) -> pd.DataFrame:
                 "algorithm": name,
                 "n_seeds": here.sizes["seed"],
             }
+            row["n_diverged"] = divergence.count(data, name, point)
             row |= {f"optimum_{metric}": value for metric, value in optimum.items()}
             for label, values in numbers.items():
                 mean = mean_over_seeds(np.asarray(values.values, float))

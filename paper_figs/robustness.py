@@ -12,7 +12,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 from scipy import stats
 
-from paper_figs import ranking, regret, style
+from paper_figs import divergence, ranking, regret, style
 from paper_figs.claims import first
 from paper_figs.convergence import TOLERANCE, WINDOW, convergence_episode, gaps, sample_complexity
 from paper_figs.statistics import CONFIDENCE, mean_over_seeds, proportion
@@ -75,7 +75,7 @@ def distributions(data: xr.Dataset, environment: str) -> pd.DataFrame:
         for name in data["algorithm"].values:
             values = score.of(data, name)
             row = {"environment": environment, "score": label, "algorithm": name, "n_seeds": len(values)}
-            rows.append(row | _distribution(values))
+            rows.append(row | {"n_diverged": divergence.count(data, name)} | _distribution(values))
     return pd.DataFrame(rows)
 
 

@@ -38,7 +38,21 @@ class Run:
     """A tiny version of the sweep."""
 
 
-Command = Annotated[List, tyro.conf.subcommand("list")] | Annotated[Run, tyro.conf.subcommand("run")]
+@dataclass(frozen=True)
+class Verify:
+    """Compute parts of results anew and compare them bit for bit; exit status 1 if anything differs."""
+
+    folder: tyro.conf.Positional[Path]
+    """Folder of one sweep's parts, such as out/results/fig6."""
+    parts: int | None = None
+    """How many parts, evenly spread. Default: all."""
+
+
+Command = (
+    Annotated[List, tyro.conf.subcommand("list")]
+    | Annotated[Run, tyro.conf.subcommand("run")]
+    | Annotated[Verify, tyro.conf.subcommand("verify")]
+)
 
 
 def main(args: list[str] | None = None) -> int:
@@ -59,6 +73,8 @@ def main(args: list[str] | None = None) -> int:
             print(f"{study.name:12s} {study.description}")
         return 0
     try:
+        if isinstance(command, Verify):
+            return _verify(command)
         choice("name", command.name, tuple(STUDIES))
         study = STUDIES[command.name]
         size = size_of(command.seeds, command.episodes, command.preset, command.smoke, study)
@@ -71,6 +87,20 @@ def main(args: list[str] | None = None) -> int:
         return 2
     print("\n".join(map(str, written)))
     return 0
+
+
+def _verify(command: Verify) -> int:
+    """Prints what differs; returns the exit status."""
+    from sweeps import verify
+    from sweeps.registry import EVERY_SWEEP
+
+    differ = 0
+    for part, differences in verify.verify(command.folder, command.parts, EVERY_SWEEP):
+        differ += bool(differences)
+        print(f"{part.path}: {'differs' if differences else 'the same, bit for bit'}")
+        for line in differences and [*differences, *verify.made_elsewhere(part)]:
+            print(f"  {line}")
+    return min(differ, 1)
 
 
 if __name__ == "__main__":

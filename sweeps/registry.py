@@ -18,3 +18,7 @@ SWEEPS: dict[str, Sweep] = {sweep.name: sweep for sweep in (FIG5A, FIG5B, FIG6, 
 STUDIES: dict[str, Study] = {sweep.name: Study(sweep.name, sweep.description, (sweep,)) for sweep in SWEEPS.values()}
 STUDIES |= {study.name: study for study in (ROBUSTNESS, MULTIVERSE)}
 """All that `python -m sweeps run` takes."""
+EVERY_SWEEP: dict[str, Sweep] = {
+    part.name: part for study in STUDIES.values() for sweep in study.sweeps for part in (sweep, sweep.source) if part
+}
+"""Those of all studies, with the ones that train source agents, by the folder of their results."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,16 +14,16 @@ import numpy as np
 import xarray as xr
 
 from jrcjax import parallel
-from jrcjax.episodes import spec_of
 from jrcjax.hparams import Config
 from jrcjax.learners import Source, Spec, make_learner
 from jrcjax.learners.q_function import q_function
 from jrcjax.n_step import NStepTransition
 from jrcjax.presets import paper_params
 from jrcjax.source import source_of
-from sweeps import store
+from sweeps import files, store
 from sweeps.estimate import seconds_per_episode
-from sweeps.program import Points, keys_of, points_of, reference_of, run_block
+from sweeps.parts import parts_of
+from sweeps.program import joined, keys_of, points_of, reference_of, run_block, spec_of_points
 from sweeps.sweep import Size, Sweep
 
 SOURCE = Sweep(
@@ -64,34 +65,44 @@ def sources_of(source: Sweep, size: Size, seeds: range, out: Path, advance: Call
       ConfigurationMismatch: if the folder holds agents of another configuration.
     """
     folder = out / source.name
-    if missing := missing_sources(source, size, seeds, out):
-        folder.mkdir(parents=True, exist_ok=True)
-        _train(source, size, missing, folder, advance)
+    if missing_sources(source, size, seeds, out):
+        # Sweeps that run at the same time share the folder: one trains, the others wait for its agents.
+        with files.locked(folder, lambda held: print(f"{held}; waiting for its agents", file=sys.stderr)):
+            if missing := missing_sources(source, size, seeds, out):
+                store.write_part(folder, missing, trained(source, size, missing, advance)[1])
+            store.write_manifest(folder)
     return _load(source, size, seeds, folder)
 
 
-def _train(sweep: Sweep, size: Size, seeds: range, folder: Path, advance: Callable[[float], None]) -> None:
+def trained(sweep: Sweep, size: Size, seeds: range, advance: Callable[[float], None]) -> tuple[Source, xr.Dataset]:
+    """Trains the source agents of some seeds.
+
+    Args:
+      sweep: what trains them.
+      size: the preset and lengths of the runs.
+      seeds: the seeds.
+      advance: told how many of the expected seconds are done.
+
+    Returns:
+      Weights and demonstrations, every leaf with leading axes of points and of seeds, and what is kept of them on disk.
+    """
     points = points_of(sweep, size.preset)
     logs: list[Any] = []
-    agents: Any = None
+    groups: Any = None
     for chunk in run_block(sweep, size, points, seeds, None):
         logs.append(chunk.log)
-        agents = chunk.agents["ddqn"]
+        groups = chunk.groups
         advance(chunk.episodes * seconds_per_episode(sweep, len(seeds)))
     log = jax.tree.map(lambda *parts: np.concatenate(parts, axis=-1), *logs)
+    hand_on = _hand_on(spec_of_points(points), sweep.config(size))
     shape = (len(sweep.x_values), len(seeds))
     point, seed = (a.reshape(-1) for a in np.indices(shape))
-    lanes = parallel.padded(point.size)
-    key_and_point = parallel.pad_agents((keys_of(np.array(seeds)[seed]), jnp.asarray(point)), lanes)
-    handed_on = _hand_on(_spec_of(points), sweep.config(size))(points, (*key_and_point, agents.learner))
-    source = jax.tree.map(lambda leaf: np.asarray(leaf[: point.size]).reshape(*shape, *leaf.shape[1:]), handed_on)
-    data = store.dataset(sweep, size, seeds, log, reference_of(points, size.episodes)).assign(_variables(source))
-    store.write_part(folder, seeds, data)
-    store.write_manifest(folder, sweep, size)
-
-
-def _spec_of(points: Points) -> Spec:
-    return spec_of(jax.tree.map(lambda leaf: leaf[0], points.params))
+    keys_and_points = parallel.groups((keys_of(np.array(seeds)[seed]), jnp.asarray(point)))
+    lanes = [(*which, group["ddqn"].learner) for which, group in zip(keys_and_points, groups, strict=True)]
+    handed_on = joined([hand_on(points, group) for group in lanes])
+    source = jax.tree.map(lambda leaf: leaf[: point.size].reshape(*shape, *leaf.shape[1:]), handed_on)
+    data = store.dataset(sweep, size, seeds, log, reference_of(points, size.episodes))
+    return source, data.assign(_variables(source))
 
 
 @functools.cache
@@ -119,10 +130,9 @@ def _variables(source: Source) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
 
 
 def _load(sweep: Sweep, size: Size, seeds: range, folder: Path) -> Source:
-    parts = [xr.load_dataset(path, engine="h5netcdf") for path in sorted(folder.glob("seeds-*.nc"))]
-    names = [name for name in parts[0].data_vars if str(name).startswith(("demonstration_", "weights_"))]
-    whole = xr.concat([part[names] for part in parts], "seed").drop_duplicates("seed").sel(seed=list(seeds))
-    function = q_function(_spec_of(points_of(sweep, size.preset)), sweep.config(size))
+    parts = [part for part in parts_of(folder) if set(part.seeds) & set(seeds)]
+    whole = store.joined(parts).sel(seed=list(seeds))
+    function = q_function(spec_of_points(points_of(sweep, size.preset)), sweep.config(size))
     like = jax.eval_shape(function.init, jax.random.key(0))
     weights = [
         jnp.asarray(whole["weights_" + "_".join(str(part.key) for part in path)].values)

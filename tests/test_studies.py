@@ -198,8 +198,10 @@ def test_main_effects_find_the_reading_that_decides_and_no_other(monkeypatch):
         return [judged(effect, effect - 0.5, effect + 0.5, "decided"), judged(noise[universe], -9, 9, "noise")]
 
     groups = grouped(UNIVERSES)
-    sources = {name: xr.Dataset(coords={"point": range(len(of))}) for name, of in groups.items()}
-    targets = {name: xr.Dataset(coords={"point": range(len(of) * len(POINTS))}) for name, of in groups.items()}
+    sources = {name: xr.Dataset(coords={"point": range(len(of)), "algorithm": []}) for name, of in groups.items()}
+    targets = {
+        name: xr.Dataset(coords={"point": range(len(of) * len(POINTS)), "algorithm": []}) for name, of in groups.items()
+    }
     found_by = {name: iter(of) for name, of in groups.items()}
     order = iter(u for name in groups for u in found_by[name])
     monkeypatch.setattr(multiverse, "claims_of", lambda source, target: judged_in(next(order)))

@@ -9,7 +9,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-import xarray as xr
 from rich.console import Console
 
 import jrcjax
@@ -21,7 +20,7 @@ from jrcjax.transfer import target_key
 from sweeps import store
 from sweeps.__main__ import main
 from sweeps.program import chunk_of, points_of, reference_of
-from sweeps.registry import SWEEPS
+from sweeps.registry import STUDIES, SWEEPS
 from sweeps.run import blocks, expected_seconds, run_sweep
 from sweeps.sources import SOURCE, missing_sources, sources_of
 from sweeps.sweep import SMOKE, Size, size_of
@@ -98,18 +97,6 @@ def test_results_know_how_they_were_made_without_git(monkeypatch):
 def test_existing_results_are_not_touched_without_resume(folder):
     with pytest.raises(ValueError, match="--resume"):
         run_sweep(FIG5A, SIZE, folder.parent, QUIET, resume=False)
-
-
-def test_an_interrupted_write_leaves_no_part(tmp_path, monkeypatch):
-    def broken(self, path, **options):
-        with open(path, "wb") as file:
-            file.write(b"half")
-        raise OSError("disk full")
-
-    monkeypatch.setattr(xr.Dataset, "to_netcdf", broken)
-    with pytest.raises(OSError, match="disk full"):
-        store.write_part(tmp_path, range(2), xr.Dataset())
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_missing_seeds_are_named(folder):
@@ -190,7 +177,7 @@ def test_command_line_errors_name_field_value_and_allowed(arguments, message, ca
 
 def test_list_names_every_sweep(capsys):
     assert main(["list"]) == 0
-    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == list(SWEEPS)
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == list(STUDIES)
 
 
 def test_options_overrule_the_smoke_size():
