@@ -16,7 +16,7 @@ from sweeps.sweep import Size, size_of
 
 @dataclass(frozen=True)
 class Options:
-    """Regenerates the paper's figures: PDF, PNG and CSV each, claims.json and report.html."""
+    """Regenerates the paper's figures: PDF, PNG and CSV each; claims, regret, the seeds needed, and report.html."""
 
     only: tuple[int, ...] = ()
     """Numbers of the figures to draw. Default: all."""
@@ -43,7 +43,9 @@ def make_figures(numbers: tuple[int, ...], size: Size, out: Path, console: Conso
     Raises:
       ValueError: unknown figures, bad sizes, or results of another configuration in `out`.
     """
-    from paper_figs import claims, divergence, report, style
+    import pandas as pd
+
+    from paper_figs import claims, divergence, ranking, regret, report, style
     from paper_figs.figures import FIGURES, NUMBERS
     from sweeps import store
     from sweeps.estimate import in_words
@@ -62,6 +64,7 @@ def make_figures(numbers: tuple[int, ...], size: Size, out: Path, console: Conso
         f"{len(wanted)} figures, {size.seeds} seeds, {size.episodes} episodes: about {in_words(seconds)} in all"
     )
     written, pictures, judgements, optima, diverged, manifests = [], {}, [], [], [], {}
+    tables: dict[str, list[pd.DataFrame]] = {"regret": [], "seeds_needed": []}
     for figure in wanted:
         folder = run_sweep(SWEEPS[figure.name], size, results, console, resume=True)
         data = store.load(folder, size.seeds)
@@ -74,7 +77,12 @@ def make_figures(numbers: tuple[int, ...], size: Size, out: Path, console: Conso
         judgements += [dataclasses.replace(claim, n_diverged=len(lost)) for claim in figure.claims(data)]
         diverged += lost
         optima += report.optimum_rows(figure.name, data)
+        tables["regret"].append(regret.table(data, figure.name))
+        tables["seeds_needed"].append(ranking.needed_table(data, figure.name))
         manifests[figure.name] = (folder / store.MANIFEST).read_text()
+    for name, parts in tables.items():
+        pd.concat(parts).to_csv(out / f"{name}.csv", index=False, float_format="%.6g")
+        written.append(out / f"{name}.csv")
     page = report.render(size, pictures, judgements, optima, diverged, manifests)
     texts = {"claims.json": json.dumps(claims.as_json(judgements), indent=2) + "\n", "report.html": page}
     for name, text in texts.items():

@@ -45,10 +45,10 @@ def seeds_needed(differences: np.ndarray) -> float:
     return float(np.maximum(np.ceil((stats.norm.ppf(CONFIDENCE) * deviation / mean) ** 2), 1.0))
 
 
-def needed_table(data: xr.Dataset, figure: str, metrics: tuple[str, ...]) -> pd.DataFrame:
+def needed_table(data: xr.Dataset, figure: str) -> pd.DataFrame:
     """Seeds needed to rank each two learners at each point of a figure, by means over all episodes."""
     rows = []
-    for metric in metrics:
+    for metric in ("reward", "throughput", "miss_detection"):
         of = {name: first(data, metric, name) for name in data["algorithm"].values}
         for a, b in itertools.combinations(of, 2):
             for point in range(data.sizes["point"]):

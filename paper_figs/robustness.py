@@ -137,10 +137,8 @@ def tables(environments: dict[str, xr.Dataset]) -> dict[str, pd.DataFrame]:
         "improvement": improvements,
         "misranking": misrankings,
         "profile": profiles,
-        "regret": lambda data, environment: regret.table(data, environment),
-        "seeds_needed": lambda data, environment: ranking.needed_table(
-            data, environment, ("reward", "throughput", "miss_detection")
-        ),
+        "regret": regret.table,
+        "seeds_needed": ranking.needed_table,
     }
     return {
         name: pd.concat([make(data, environment) for environment, data in environments.items()], ignore_index=True)
