@@ -10,6 +10,7 @@ from jrcjax.episodes import AgentState, Log
 from jrcjax.hparams import Config, HParams
 from jrcjax.learners import Source
 from jrcjax.params import EnvParams, check_params
+from jrcjax.params_file import load_params, save_params
 from jrcjax.presets import paper_params
 from jrcjax.source import train_source
 from jrcjax.training import train, train_agents
@@ -19,5 +20,6 @@ __version__ = "0.1.0"
 
 __all__ = [
     "AgentState", "Config", "EnvParams", "EnvState", "HParams", "JRCEnv", "Log", "Source", "Transfer", "check_params",
-    "events", "exact", "paper_params", "radar", "train", "train_agents", "train_source", "transfer",
+    "events", "exact", "load_params", "paper_params", "radar", "save_params", "train", "train_agents", "train_source",
+    "transfer",
 ]  # fmt: skip
