@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
 import tyro
 from rich.console import Console
 
+from jrcjax.checks import refuse
+from sweeps.custom import CUSTOM, Custom, Options, custom_sweep
 from sweeps.sweep import size_of
 
 
@@ -23,7 +25,7 @@ class Run:
     """Run one sweep; results go to OUT/NAME."""
 
     name: tyro.conf.Positional[str]
-    """A sweep's name, as `list` shows it."""
+    """A sweep's name, as `list` shows it, or custom."""
     seeds: int | None = None
     """Independent seeds. Default: 10, or 2 with --smoke."""
     episodes: int | None = None
@@ -36,6 +38,7 @@ class Run:
     """Continue where an earlier run with the same configuration stopped."""
     smoke: bool = False
     """A tiny version of the sweep."""
+    custom: tyro.conf.OmitArgPrefixes[Options] = field(default_factory=Options)
 
 
 Command = Annotated[List, tyro.conf.subcommand("list")] | Annotated[Run, tyro.conf.subcommand("run")]
@@ -46,26 +49,43 @@ def main(args: list[str] | None = None) -> int:
     command = tyro.cli(Command, prog="python -m sweeps", args=args)
     from jrcjax import parallel  # after parsing, so that --help and errors come at once
     from jrcjax.types import choice
+    from paper_figs import custom
 
     parallel.use_all_cores()
     parallel.keep_compiled()
     from sweeps.registry import SWEEPS
     from sweeps.run import run_sweep
+    from sweeps.sources import SOURCE
 
     console = Console(stderr=True)
     if isinstance(command, List):
         for sweep in SWEEPS.values():
             print(f"{sweep.name:12s} {sweep.description}")
+        print(f"{CUSTOM:12s} one of your own: run custom --vary PATH=VALUES")
         return 0
     try:
-        choice("name", command.name, tuple(SWEEPS))
+        choice("name", command.name, (*SWEEPS, CUSTOM))
         size = size_of(command.seeds, command.episodes, command.preset, command.smoke)
-        folder = run_sweep(SWEEPS[command.name], size, command.out, console, resume=command.resume)
+        size.check()
+        own = _own(command, (*SWEEPS, SOURCE.name))
+        sweep = own.sweep if own else SWEEPS[command.name]
+        folder = run_sweep(sweep, size, command.out, console, resume=command.resume)
+        written = custom.write(folder, own, size.seeds) if own else []
     except (ValueError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
-    print(folder)
+    print("\n".join(map(str, [folder, *written])))
     return 0
+
+
+def _own(command: Run, taken: tuple[str, ...]) -> Custom | None:
+    """The sweep that the options of `run custom` describe; other sweeps refuse these options."""
+    if command.name == CUSTOM:
+        return custom_sweep(command.custom, command.preset, taken)
+    given = [name for name, value in vars(command.custom).items() if value != getattr(Options(), name)]
+    if given:
+        refuse("name", command.name, f"{CUSTOM}, for which alone --{given[0]} is")
+    return None
 
 
 if __name__ == "__main__":

@@ -12,7 +12,8 @@ ROOT = Path(__file__).parents[1]
 ENVIRONMENT = {"slot", "environment", "exact"}
 # What puts the parts together; modules of the package that are in none of these sets hold equations.
 TRAINING = {"__init__", "training", "parallel", "episodes", "source", "transfer", "adapters"}
-LEVELS = ("equations", "environment", "learners", "training", "sweeps", "paper_figs")
+COMMANDS = {"sweeps.__main__"}  # runs sweeps and has one drawn; nothing imports it
+LEVELS = ("equations", "environment", "learners", "training", "sweeps", "paper_figs", "commands")
 
 
 def module_of(path: Path) -> str:
@@ -21,6 +22,8 @@ def module_of(path: Path) -> str:
 
 def level(module: str) -> int:
     parts = module.split(".")
+    if module in COMMANDS:
+        return LEVELS.index("commands")
     if parts[0] != "jrcjax":
         return LEVELS.index(parts[0])
     name = parts[1] if len(parts) > 1 else "__init__"

@@ -187,7 +187,7 @@ def test_command_line_errors_name_field_value_and_allowed(arguments, message, ca
 
 def test_list_names_every_sweep(capsys):
     assert main(["list"]) == 0
-    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == list(SWEEPS)
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == [*SWEEPS, "custom"]
 
 
 def test_options_overrule_the_smoke_size():
