@@ -7,12 +7,14 @@ from pathlib import Path
 
 import jax
 import numpy as np
+import xarray as xr
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from jrcjax.episodes import Log
+from jrcjax.learners import Source
 from jrcjax.provenance import usable_cores
-from sweeps import estimate, store
+from sweeps import estimate, files, store
 from sweeps.program import Points, Reference, points_of, reference_of, run_block
 from sweeps.sources import SOURCE, missing_sources, sources_of
 from sweeps.sweep import Size, Sweep
@@ -77,6 +79,7 @@ def run_sweep(sweep: Sweep, size: Size, out: Path, console: Console, *, resume: 
 
     Raises:
       ValueError: bad sizes, or a folder that already holds results.
+      FolderInUse: if another process writes to the folder.
     """
     size.check()
     folder = out / sweep.name
@@ -86,17 +89,23 @@ def run_sweep(sweep: Sweep, size: Size, out: Path, console: Console, *, resume: 
         raise ValueError(f"{folder} holds results of {finished} seeds already; add --resume, or choose another --out")
     if not todo:
         console.print(f"{sweep.name}: all {size.seeds} seeds are there, in {folder}")
+        store.write_manifest(folder)
         return folder
     seconds = expected_seconds([sweep], size, out)
     console.print(_announcement(sweep, size, todo, seconds))
-    folder.mkdir(parents=True, exist_ok=True)
+    with files.locked(folder):
+        _run_blocks(sweep, size, out, console, seconds)
+    return folder
+
+
+def _run_blocks(sweep: Sweep, size: Size, out: Path, console: Console, seconds: float) -> None:
+    """Runs what is missing, as it is now that nobody else writes, and shows the progress of so many seconds."""
     points = points_of(sweep, size.preset)
     reference = reference_of(points, size.episodes)
     with Progress(*_COLUMNS, console=console) as progress:
         task = progress.add_task(sweep.name, total=seconds)
-        for seeds in todo:
+        for seeds in to_do(sweep, size, out):
             _run_block(sweep, size, points, reference, seeds, out, lambda done: progress.advance(task, done))
-    return folder
 
 
 def _announcement(sweep: Sweep, size: Size, todo: list[range], seconds: float) -> str:
@@ -118,6 +127,21 @@ def _run_block(
 ) -> None:
     """Runs one block of seeds and writes its part; `advance` is told how many of the expected seconds are done."""
     source = sources_of(size, seeds, out, advance) if sweep.transfers else None
+    folder = out / sweep.name
+    store.write_part(folder, seeds, results_of(sweep, size, points, reference, seeds, source, advance))
+    store.write_manifest(folder)
+
+
+def results_of(
+    sweep: Sweep,
+    size: Size,
+    points: Points,
+    reference: Reference,
+    seeds: range,
+    source: Source | None,
+    advance: Callable[[float], None],
+) -> xr.Dataset:
+    """The results of one block of seeds; `advance` is told how many of the expected seconds are done."""
     logs: list[dict[str, Log]] = []
     for chunk in run_block(sweep, size, points, seeds, source):
         if not logs:
@@ -125,6 +149,4 @@ def _run_block(
         logs.append(chunk.log)
         advance(chunk.episodes * estimate.seconds_per_episode(sweep, len(seeds)))
     whole = jax.tree.map(lambda *parts: np.concatenate(parts, axis=-1), *logs)
-    folder = out / sweep.name
-    store.write_part(folder, seeds, store.dataset(sweep, size, seeds, whole, reference))
-    store.write_manifest(folder, sweep, size)
+    return store.dataset(sweep, size, seeds, whole, reference)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -20,8 +21,9 @@ from jrcjax.learners.q_function import q_function
 from jrcjax.n_step import NStepTransition
 from jrcjax.presets import paper_params
 from jrcjax.source import source_of
-from sweeps import store
+from sweeps import files, store
 from sweeps.estimate import seconds_per_episode
+from sweeps.parts import parts_of
 from sweeps.program import keys_of, points_of, reference_of, run_block
 from sweeps.sweep import Size, Sweep
 
@@ -63,13 +65,16 @@ def sources_of(size: Size, seeds: range, out: Path, advance: Callable[[float], N
       ConfigurationMismatch: if the folder holds agents of another configuration.
     """
     folder = out / SOURCE.name
-    if missing := missing_sources(size, seeds, out):
-        folder.mkdir(parents=True, exist_ok=True)
-        _train(size, missing, folder, advance)
+    if missing_sources(size, seeds, out):
+        # Sweeps that run at the same time share the folder: one trains, the others wait for its agents.
+        with files.locked(folder, lambda held: print(f"{held}; waiting for its agents", file=sys.stderr)):
+            if missing := missing_sources(size, seeds, out):
+                store.write_part(folder, missing, _trained(size, missing, advance))
+            store.write_manifest(folder)
     return _load(size, seeds, folder)
 
 
-def _train(size: Size, seeds: range, folder: Path, advance: Callable[[float], None]) -> None:
+def _trained(size: Size, seeds: range, advance: Callable[[float], None]) -> xr.Dataset:
     points = points_of(SOURCE, size.preset)
     logs: list[Any] = []
     agents: Any = None
@@ -81,9 +86,7 @@ def _train(size: Size, seeds: range, folder: Path, advance: Callable[[float], No
     hand_on = _hand_on(size.config, size.preset)
     keys = parallel.pad_agents(keys_of(np.array(seeds)), parallel.padded(len(seeds)))
     source = jax.tree.map(lambda leaf: leaf[: len(seeds)], hand_on(points, (keys, agents.learner)))
-    data = store.dataset(SOURCE, size, seeds, log, reference_of(points, size.episodes)).assign(_variables(source))
-    store.write_part(folder, seeds, data)
-    store.write_manifest(folder, SOURCE, size)
+    return store.dataset(SOURCE, size, seeds, log, reference_of(points, size.episodes)).assign(_variables(source))
 
 
 @functools.cache
@@ -111,9 +114,8 @@ def _variables(source: Source) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
 
 
 def _load(size: Size, seeds: range, folder: Path) -> Source:
-    parts = [xr.load_dataset(path, engine="h5netcdf") for path in sorted(folder.glob("seeds-*.nc"))]
-    names = [name for name in parts[0].data_vars if str(name).startswith(("demonstration_", "weights_"))]
-    whole = xr.concat([part[names] for part in parts], "seed").drop_duplicates("seed").sel(seed=list(seeds))
+    parts = [part for part in parts_of(folder) if set(part.seeds) & set(seeds)]
+    whole = store.joined(parts).sel(seed=list(seeds))
     function = q_function(spec_of(paper_params("source", size.preset)), size.config)
     like = jax.eval_shape(function.init, jax.random.key(0))
     weights = [

@@ -1,7 +1,7 @@
-"""Results on disk: immutable parts (netCDF), one per block of seeds, and a manifest.
+"""Results of a sweep on disk: what is in a part (see `sweeps.parts`), which parts go together, and the manifest.
 
-A part is written under a temporary name, synced and renamed, so it is whole or absent. Its attributes hold the
-configuration that made it; a folder never mixes configurations.
+A part holds the configuration that made it; a folder never mixes configurations. The manifest says what is in the
+folder, for a reader; it follows from the parts and is written anew whenever it does not fit them.
 """
 
 from __future__ import annotations
@@ -9,8 +9,6 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
-import os
-import tempfile
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -25,8 +23,15 @@ from jrcjax.hparams import HParams
 from jrcjax.params import EnvParams
 from jrcjax.presets import paper_params
 from jrcjax.provenance import provenance
+from sweeps import files
+from sweeps.parts import Part, finished_seeds, part_path, parts_of, read_part, write_part
 from sweeps.program import Reference, points_of
 from sweeps.sweep import Size, Sweep
+
+__all__ = [
+    "MANIFEST", "ConfigurationMismatch", "check_folder", "configuration", "dataset", "digest_of", "finished_seeds",
+    "load", "part_path", "write_manifest", "write_part",
+]  # fmt: skip
 
 MANIFEST = "manifest.json"
 
@@ -67,25 +72,34 @@ def _plain(values: jax.Array) -> float | list[float]:
 
 
 def check_folder(folder: Path, sweep: Sweep, size: Size) -> None:
-    """Refuses a folder with results of another configuration.
+    """Refuses a folder with results of another configuration, and sets aside what is of another sweep.
 
     Raises:
       ConfigurationMismatch: naming each field that differs, with both values.
     """
-    wanted = configuration(sweep, size)
-    for path in sorted(folder.glob("seeds-*.nc")):
-        with xr.open_dataset(path, engine="h5netcdf") as part:
-            found = json.loads(part.attrs["configuration"])
-        differing = [
-            f"{key}: {json.dumps(found.get(key))} there, {json.dumps(wanted.get(key))} wanted"
-            for key in sorted({*found, *wanted})
-            if found.get(key) != wanted.get(key)
-        ]
-        if differing:
+    parts = parts_of(folder)
+    wanted = configuration(sweep, size) if parts else {}
+    for part in parts:
+        if part.configuration.get("sweep") != sweep.name:
+            files.set_aside(part.path, f"it is of the sweep {part.configuration.get('sweep')!r}")
+            continue
+        if differing := _differing(part.configuration, wanted):
             raise ConfigurationMismatch(
-                f"{path} holds results of another configuration ({'; '.join(differing)}); "
+                f"{part.path} holds results of another configuration ({'; '.join(differing)}); "
                 "choose another --out, or remove the folder"
             )
+
+
+def _differing(there: dict[str, Any], wanted: dict[str, Any], prefix: str = "") -> list[str]:
+    """What differs between two configurations, by dotted field."""
+    found = []
+    for key in sorted({*there, *wanted}):
+        a, b = there.get(key), wanted.get(key)
+        if isinstance(a, dict) and isinstance(b, dict):
+            found += _differing(a, b, f"{prefix}{key}.")
+        elif a != b:
+            found.append(f"{prefix}{key}: {json.dumps(a)} there, {json.dumps(b)} wanted")
+    return found
 
 
 def dataset(sweep: Sweep, size: Size, seeds: range, log: dict[str, Log], exact: Reference) -> xr.Dataset:
@@ -108,53 +122,21 @@ def dataset(sweep: Sweep, size: Size, seeds: range, log: dict[str, Log], exact: 
     return xr.Dataset(variables, coords, {name: json.dumps(value, sort_keys=True) for name, value in about.items()})
 
 
-def part_path(folder: Path, seeds: range) -> Path:
-    """File of a block of seeds."""
-    return folder / f"seeds-{seeds.start:06d}-{seeds.stop - 1:06d}.nc"
-
-
-def write_part(folder: Path, seeds: range, data: xr.Dataset) -> Path:
-    """Writes one part, whole or not at all."""
-    path = part_path(folder, seeds)
-    encoding = {name: {"zlib": True, "complevel": 4} for name in data.data_vars if data[name].ndim > 1}
-    _whole(path, lambda temporary: data.to_netcdf(temporary, engine="h5netcdf", encoding=encoding))
-    return path
-
-
-def write_manifest(folder: Path, sweep: Sweep, size: Size) -> None:
-    """Writes what the folder holds and how it came about."""
+def write_manifest(folder: Path) -> None:
+    """Writes what the folder holds and how it came about, if it is not written there already."""
+    parts = parts_of(folder)
+    if not parts:
+        return
     manifest = {
-        "configuration": configuration(sweep, size),
-        "seeds": sorted(finished_seeds(folder)),
-        "parts": sorted(path.name for path in folder.glob("seeds-*.nc")),
-        **provenance(),
+        "configuration": parts[0].configuration,
+        "seeds": sorted({seed for part in parts for seed in part.seeds}),
+        "parts": {part.path.name: part.digest for part in parts},
+        **max((part.provenance for part in parts), key=lambda made: made["finished"]),
     }
-    text = json.dumps(manifest, indent=2) + "\n"
-    _whole(folder / MANIFEST, lambda temporary: Path(temporary).write_text(text))
-
-
-def _whole(path: Path, write) -> None:
-    """Writes a file under a temporary name, syncs it, and gives it its name."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".", suffix=path.suffix)
-    os.close(handle)
-    try:
-        write(temporary)
-        with open(temporary, "rb") as written:
-            os.fsync(written.fileno())
-        Path(temporary).chmod(0o644)
-        Path(temporary).replace(path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
-
-
-def finished_seeds(folder: Path) -> set[int]:
-    """Seeds whose parts are there."""
-    found: set[int] = set()
-    for path in folder.glob("seeds-*.nc"):
-        first, last = path.stem.removeprefix("seeds-").split("-")
-        found |= set(range(int(first), int(last) + 1))
-    return found
+    text = (json.dumps(manifest, indent=2) + "\n").encode()
+    path = folder / MANIFEST
+    if not path.is_file() or path.read_bytes() != text:
+        files.write_whole(path, text)
 
 
 def load(folder: Path, seeds: int) -> xr.Dataset:
@@ -162,10 +144,42 @@ def load(folder: Path, seeds: int) -> xr.Dataset:
 
     Raises:
       FileNotFoundError: if some of these seeds have not been run.
+      ConfigurationMismatch: if the parts are not of one configuration.
     """
-    missing = set(range(seeds)) - finished_seeds(folder)
+    parts = [part for part in parts_of(folder) if part.seeds.start < seeds]
+    missing = set(range(seeds)) - {seed for part in parts for seed in part.seeds}
     if missing:
-        raise FileNotFoundError(f"{folder}: no results for seeds {sorted(missing)[:5]}...; run the sweep first")
-    parts = [xr.load_dataset(path, engine="h5netcdf") for path in sorted(folder.glob("seeds-*.nc"))]
-    whole = xr.concat(parts, "seed", data_vars="minimal", coords="minimal", compat="override", join="override")
-    return whole.sortby("seed").sel(seed=slice(0, seeds - 1))
+        raise FileNotFoundError(f"{folder}: no results for seeds {in_words(missing)}; run the sweep first")
+    return joined(parts).sel(seed=slice(0, seeds - 1))
+
+
+def joined(parts: list[Part]) -> xr.Dataset:
+    """All seeds of some parts in ascending order, each once.
+
+    Raises:
+      ConfigurationMismatch: if the parts are not of one configuration.
+    """
+    for part in parts:
+        if differing := _differing(part.configuration, parts[0].configuration):
+            raise ConfigurationMismatch(f"{part.path} does not go with {parts[0].path}: {'; '.join(differing)}")
+    whole = xr.concat(
+        [read_part(part.path) for part in parts],
+        "seed",
+        data_vars="minimal",
+        coords="minimal",
+        compat="override",
+        join="override",
+        combine_attrs="override",
+    )
+    return whole.drop_duplicates("seed").sortby("seed")
+
+
+def in_words(seeds: set[int]) -> str:
+    """Seeds as a person lists them: "0 to 15, 20"."""
+    runs: list[list[int]] = []
+    for seed in sorted(seeds):
+        if runs and runs[-1][-1] == seed - 1:
+            runs[-1] = [runs[-1][0], seed]
+        else:
+            runs.append([seed, seed])
+    return ", ".join(f"{a}" if a == b else f"{a} to {b}" for a, b in runs)

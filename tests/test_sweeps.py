@@ -9,7 +9,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-import xarray as xr
 from rich.console import Console
 
 import jrcjax
@@ -95,18 +94,6 @@ def test_results_know_how_they_were_made_without_git(monkeypatch):
 def test_existing_results_are_not_touched_without_resume(folder):
     with pytest.raises(ValueError, match="--resume"):
         run_sweep(FIG5A, SIZE, folder.parent, QUIET, resume=False)
-
-
-def test_an_interrupted_write_leaves_no_part(tmp_path, monkeypatch):
-    def broken(self, path, **options):
-        with open(path, "wb") as file:
-            file.write(b"half")
-        raise OSError("disk full")
-
-    monkeypatch.setattr(xr.Dataset, "to_netcdf", broken)
-    with pytest.raises(OSError, match="disk full"):
-        store.write_part(tmp_path, range(2), xr.Dataset())
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_missing_seeds_are_named(folder):

@@ -1,0 +1,247 @@
+"""Results on disk under damage, kills, full disks and two runs at once: nothing lost, nothing silent."""
+
+import errno
+import json
+import os
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import jax
+import numpy as np
+import pytest
+from rich.console import Console
+
+from sweeps import files, parts, sources, store
+from sweeps.registry import SWEEPS
+from sweeps.run import run_sweep
+from sweeps.sweep import Size
+
+ROOT = Path(__file__).parents[1]
+QUIET = Console(quiet=True)
+CHEAP = replace(SWEEPS["fig5a"], name="cheap", learners=("round_robin",))
+SIZE = Size(seeds=3, episodes=1)
+
+
+@pytest.fixture(scope="module")
+def untouched(tmp_path_factory):
+    """Results of a run that nothing happened to."""
+    return run_sweep(CHEAP, SIZE, tmp_path_factory.mktemp("untouched"), QUIET, resume=False)
+
+
+@pytest.fixture
+def folder(untouched, tmp_path):
+    """A copy to damage."""
+    copy = tmp_path / untouched.name
+    copy.mkdir()
+    for path in untouched.iterdir():
+        (copy / path.name).write_bytes(path.read_bytes())
+    return copy
+
+
+def digests(folder: Path) -> dict[str, str]:
+    return {part.path.name: part.digest for part in parts.parts_of(folder)}
+
+
+def flipped(content: bytes, bit: int) -> bytes:
+    changed = bytearray(content)
+    changed[bit // 8] ^= 1 << bit % 8
+    return bytes(changed)
+
+
+def test_every_flipped_bit_and_every_lost_byte_is_seen(tmp_path):
+    content, path = bytes(range(40)), tmp_path / "file"
+    path.write_bytes(files.sealed(content))
+    assert files.unsealed(path) == content
+    whole = path.read_bytes()
+    for changed in [flipped(whole, i) for i in range(8 * len(whole))] + [whole[:n] for n in range(len(whole))]:
+        path.write_bytes(changed)
+        with pytest.raises(files.DamagedFile):
+            files.unsealed(path)
+
+
+DAMAGE = {
+    "torn": lambda content, data: content[: len(content) // 2],
+    "empty": lambda content, data: b"",
+    "a flipped bit": lambda content, data: flipped(content, 8 * len(content) // 3),
+    "without checksum": lambda content, data: bytes(data.to_netcdf(engine="h5netcdf")),
+    "text": lambda content, data: b"no netCDF at all\n",
+    "sealed text": lambda content, data: files.sealed(b"no netCDF at all\n"),
+    "no results": lambda content, data: files.sealed(bytes(data[["reward"]].drop_attrs().to_netcdf(engine="h5netcdf"))),
+}
+
+
+@pytest.mark.parametrize("kind", DAMAGE)
+def test_a_damaged_part_is_named_set_aside_and_computed_again(kind, folder, untouched, capsys):
+    part = store.part_path(folder, range(3))
+    damaged = DAMAGE[kind](part.read_bytes(), parts.read_part(part))
+    part.write_bytes(damaged)
+    with pytest.raises(FileNotFoundError, match="no results for seeds 0 to 2"):
+        store.load(folder, 3)
+    assert f"warning: {part} is set aside as {part.name}.damaged: it" in capsys.readouterr().err
+    assert part.with_name(f"{part.name}.damaged").read_bytes() == damaged
+    run_sweep(CHEAP, SIZE, folder.parent, QUIET, resume=True)
+    assert digests(folder) == digests(untouched)
+
+
+def test_a_part_under_the_name_of_other_seeds_is_set_aside(folder, untouched, capsys):
+    store.part_path(folder, range(3)).rename(store.part_path(folder, range(5, 8)))
+    run_sweep(CHEAP, SIZE, folder.parent, QUIET, resume=True)
+    assert "seeds-000005-000007.nc.damaged: it holds seeds 0 to 2" in capsys.readouterr().err
+    assert digests(folder) == digests(untouched)
+
+
+def test_a_part_of_another_sweep_is_set_aside(folder, untouched, capsys):
+    other = run_sweep(replace(CHEAP, name="other"), SIZE, folder.parent, QUIET, resume=False)
+    part = store.part_path(folder, range(3))
+    part.write_bytes(store.part_path(other, range(3)).read_bytes())
+    run_sweep(CHEAP, SIZE, folder.parent, QUIET, resume=True)
+    assert f"{part.name}.damaged: it is of the sweep 'other'" in capsys.readouterr().err
+    assert digests(folder) == digests(untouched)
+
+
+def test_a_folder_in_the_place_of_a_part_is_set_aside(folder, untouched):
+    part = store.part_path(folder, range(3))
+    part.unlink()
+    part.mkdir()
+    run_sweep(CHEAP, SIZE, folder.parent, QUIET, resume=True)
+    assert digests(folder) == digests(untouched)
+
+
+def test_what_was_set_aside_before_is_kept(folder):
+    part = store.part_path(folder, range(3))
+    for content in (b"first", b"second"):
+        part.write_bytes(content)
+        assert parts.parts_of(folder) == []
+    assert part.with_name(f"{part.name}.damaged").read_bytes() == b"first"
+    assert part.with_name(f"{part.name}.damaged-2").read_bytes() == b"second"
+
+
+def test_seeds_in_two_parts_count_once(folder, tmp_path):
+    again = run_sweep(CHEAP, Size(seeds=2, episodes=1), tmp_path / "elsewhere", QUIET, resume=False)
+    (folder / "seeds-000000-000001.nc").write_bytes(store.part_path(again, range(2)).read_bytes())
+    assert list(store.load(folder, 3)["seed"].values) == [0, 1, 2]
+
+
+def test_parts_of_two_configurations_are_not_joined(folder, tmp_path):
+    other = run_sweep(CHEAP, replace(SIZE, seeds=5, preset="paper_table"), tmp_path / "elsewhere", QUIET, resume=False)
+    whole = parts.read_part(store.part_path(other, range(5)))
+    store.write_part(folder, range(3, 5), whole.isel(seed=slice(3, 5)))
+    with pytest.raises(store.ConfigurationMismatch, match='preset: "paper_table" there, "paper" wanted'):
+        store.load(folder, 5)
+
+
+def test_the_manifest_is_made_from_the_parts(folder):
+    path = folder / store.MANIFEST
+    manifest = json.loads(path.read_text())
+    assert manifest["parts"] == digests(folder)
+    for lost in (None, b'{"half'):
+        path.unlink() if lost is None else path.write_bytes(lost)
+        run_sweep(CHEAP, SIZE, folder.parent, QUIET, resume=True)
+        assert json.loads(path.read_text()) == manifest
+
+
+@pytest.mark.parametrize("failing", ["mkstemp", "fsync"])
+def test_a_full_disk_is_told_and_leaves_what_was_there(failing, folder, untouched, monkeypatch):
+    def full(*args, **kwargs):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as patched:
+        patched.setattr(files.tempfile if failing == "mkstemp" else files.os, failing, full)
+        with pytest.raises(OSError, match=r"No space left on device: .*seeds-000003-000003\.nc was not written") as e:
+            run_sweep(CHEAP, replace(SIZE, seeds=4), folder.parent, QUIET, resume=True)
+        assert e.value.errno == errno.ENOSPC
+    assert digests(folder) == digests(untouched)
+    assert not list(folder.glob(".*.tmp"))
+
+
+def test_a_second_run_says_that_the_folder_is_in_use(folder):
+    with files.locked(folder), pytest.raises(files.FolderInUse, match=f"process {os.getpid()} on .* is writing here"):
+        run_sweep(CHEAP, replace(SIZE, seeds=4), folder.parent, QUIET, resume=True)
+    run_sweep(CHEAP, replace(SIZE, seeds=4), folder.parent, QUIET, resume=True)
+    assert parts.finished_seeds(folder) == {0, 1, 2, 3}
+
+
+def test_a_killed_process_leaves_neither_lock_nor_temporary_files(tmp_path):
+    code = "import pathlib, sys, time; from sweeps import files\nwith files.locked(pathlib.Path(sys.argv[1])): input()"
+    process = subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], cwd=ROOT, stdin=subprocess.PIPE)
+    while not (tmp_path / ".lock").exists() or not (tmp_path / ".lock").read_text():
+        time.sleep(0.05)
+    with pytest.raises(files.FolderInUse, match=f"process {process.pid} on "), files.locked(tmp_path):
+        pass
+    (tmp_path / ".left.tmp").write_bytes(b"half")
+    process.kill()
+    process.communicate()
+    with files.locked(tmp_path):
+        assert not (tmp_path / ".left.tmp").exists()
+
+
+def test_damaged_source_agents_are_trained_again(tmp_path, capsys):
+    size = Size(seeds=2, episodes=1, pretraining=2, demonstrations=30)
+    first = sources.sources_of(size, range(2), tmp_path, lambda seconds: None)
+    part = store.part_path(tmp_path / "source", range(2))
+    part.write_bytes(flipped(part.read_bytes(), 4321))
+    again = sources.sources_of(size, range(2), tmp_path, lambda seconds: None)
+    assert "set aside" in capsys.readouterr().err
+    jax.tree.map(np.testing.assert_array_equal, first, again)
+
+
+# --- Kills ------------------------------------------------------------------------------------------------------------
+
+# Runs a sweep whose numbers are made up at once, over and over in children of its own that are killed at random
+# moments: most of a child's time is then writing, and starting one costs nothing.
+_KILLED = """
+import os, random, signal, sys, time
+from dataclasses import replace
+from pathlib import Path
+import numpy as np
+import xarray as xr
+from rich.console import Console
+from sweeps import run, store
+from sweeps.registry import SWEEPS
+from sweeps.sweep import Size
+
+def made_up(sweep, size, points, reference, seeds, source, advance):
+    rewards = np.stack([np.random.default_rng(seed).normal(size=20_000) for seed in seeds])
+    about = {"configuration": '{"sweep": "fig5a"}', "provenance": '{"finished": "now"}'}
+    return xr.Dataset({"reward": (("seed", "episode"), rewards)}, {"seed": np.array(seeds)}, about)
+
+run.results_of = made_up
+run.points_of = run.reference_of = lambda *args: None
+store.configuration = lambda sweep, size: {"sweep": "fig5a"}
+
+def go(out):
+    run.run_sweep(SWEEPS["fig5a"], Size(seeds=640), out, Console(quiet=True), resume=True)
+
+random.seed(0)
+out = Path(sys.argv[1])
+begin = time.perf_counter()
+go(out / "whole")
+seconds = time.perf_counter() - begin
+kills = 0
+for _ in range(int(sys.argv[2])):
+    child = os.fork()
+    if child == 0:
+        go(out / "killed")
+        os._exit(0)
+    time.sleep(random.uniform(0, 2 * seconds / int(sys.argv[2])))
+    os.kill(child, signal.SIGKILL)
+    kills += os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == -signal.SIGKILL
+part_way = len(list((out / "killed" / "fig5a").glob("*.nc")))
+go(out / "killed")
+print(kills, part_way)
+"""
+
+
+def test_results_are_the_same_after_twenty_kills(tmp_path):
+    command = [sys.executable, "-W", "ignore", "-c", _KILLED, str(tmp_path), "25"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    kills, part_way = map(int, done.stdout.split())
+    assert kills >= 20
+    assert part_way > 0
+    whole, killed = (tmp_path / name / "fig5a" for name in ("whole", "killed"))
+    assert len(digests(whole)) == 40
+    assert digests(killed) == digests(whole)
+    assert {path.name for path in killed.iterdir()} == {path.name for path in whole.iterdir()}
