@@ -80,7 +80,7 @@ class SavedAgent:
 
     def act(
         self, observations: ArrayLike, epsilon: float = 0.0, rng: np.random.Generator | None = None
-    ) -> np.ndarray | np.int64:
+    ) -> np.ndarray | np.integer:
         """Actions in NumPy, without JAX.
 
         Args:
@@ -116,7 +116,7 @@ class SavedAgent:
         on_grid = (np.abs(scaled - levels) <= _GRID) & (levels >= 0) & (levels < shape)
         if not on_grid.all():  # NaN is on no grid
             refuse("observations", array[~on_grid][0].item(), allowed)
-        return np.ravel_multi_index(tuple(np.moveaxis(levels.astype(int), -1, 0)), shape)
+        return np.asarray(np.ravel_multi_index(tuple(np.moveaxis(levels.astype(int), -1, 0)), shape))
 
     def evaluate(
         self, params: EnvParams | None = None, *, episodes: int = 100, key: Key | None = None, epsilon: float = 0.0

@@ -6,11 +6,12 @@ single run is one of each. What training alone needs, replay memories and optimi
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import json
 import os
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,8 @@ from jrcjax.types import Key, choice
 
 VERSION = 1
 """Of the files' layout."""
-_ABOUT = "jrcjax agents"  # key of the metadata
+ABOUT = "jrcjax agents"
+"""Key of the metadata under which a file says what it holds."""
 _CONTAINERS = dict.fromkeys(FACTORS, Factor) | {"channel": Channel, "radar": Radar}  # an environment's parts
 _OPTAX = "optax"  # an optimiser that had no name
 LEARNING = tuple(name for name in LEARNERS if name != "round_robin")
@@ -65,7 +67,8 @@ def save_agent(
     require_type("agent", agent, AgentState)
     hparams = HParams() if hparams is None else hparams
     one = jax.tree.map(lambda leaf: leaf[None], (env_params, hparams))
-    agents = {learner: jax.tree.map(lambda leaf: leaf[None, None], agent)}
+    acting = agent._replace(learner=acting_part(agent.learner))
+    agents = {learner: jax.tree.map(lambda leaf: leaf[None, None], acting)}
     return save_agents(path, agents, *one, config=config, seeds=(0,))
 
 
@@ -82,7 +85,7 @@ def save_agents(
 
     Args:
       path: of the file, which is written whole or not at all.
-      agents: by learner, every leaf with leading axes of points and seeds.
+      agents: by learner, every leaf with leading axes of points and seeds; of the learner's state the `acting_part`.
       env_params: the environments, every leaf with a leading axis of points.
       hparams: the same for hyperparameters.
       config: static settings, the same for all; Table I's if None.
@@ -97,9 +100,8 @@ def save_agents(
     points = hparams.discount.shape[0]
     for learner, agent in agents.items():
         choice("learner", learner, LEARNING)
-        values = acting_part(agent.learner)
-        _check_values(learner, values, spec_of(env_params), config, (points, len(seeds)))
-        named = _named(values) | {"key": jax.random.key_data(_typed(agent.key))}
+        _check_values(learner, agent.learner, spec_of(env_params), config, (points, len(seeds)))
+        named = _named(agent.learner) | {"key": jax.random.key_data(_typed(agent.key))}
         tensors |= {f"agents.{learner}.{name}": leaf for name, leaf in named.items()}
     about = {
         "version": VERSION,
@@ -131,18 +133,12 @@ def load_agent(
       FileNotFoundError: if there is no such file.
       ValueError: if it is no file of agents, damaged or of another version, or has no such agent.
     """
-    from safetensors import SafetensorError, safe_open  # here, as the package is used without it, too
-
-    try:
-        with safe_open(path, "numpy") as file:
-            about = _about(path, file.metadata())
-            name = _chosen("learner", learner, about["learners"])
-            x = _chosen("point", point, list(range(about["points"])))
-            number = _chosen("seed", seed, about["seeds"])
-            params, hparams = (_unnamed(_read(file, prefix, (x,))) for prefix in ("params.", "hparams."))
-            agent = _unnamed(_read(file, f"agents.{name}.", (x, about["seeds"].index(number))))
-    except SafetensorError as error:
-        raise ValueError(f"{path}: damaged, or not a file that save_agent wrote ({error})") from None
+    with opened(path) as (file, about):
+        name = _chosen("learner", learner, about["learners"])
+        x = _chosen("point", point, list(range(about["points"])))
+        number = _chosen("seed", seed, about["seeds"])
+        params, hparams = (_unnamed(_read(file, prefix, (x,))) for prefix in ("params.", "hparams."))
+        agent = _unnamed(_read(file, f"agents.{name}.", (x, about["seeds"].index(number))))
     key = jax.random.wrap_key_data(agent.pop("key"), impl=about["key_implementation"])
     config = Config(**about["config"] | {"hidden": tuple(about["config"]["hidden"])})
     environment = _environment(params, about)
@@ -211,13 +207,27 @@ def _read(file: Any, prefix: str, place: tuple[int, ...]) -> dict[str, np.ndarra
     return {name.removeprefix(prefix): file.get_slice(name)[slices][(0,) * len(place)] for name in names}
 
 
-def _about(path: str | os.PathLike, metadata: dict[str, str] | None) -> dict[str, Any]:
-    if _ABOUT not in (metadata or {}):
-        raise ValueError(f"{path}: a safetensors file without agents; allowed: one that save_agent wrote")
-    about = json.loads((metadata or {})[_ABOUT])
-    if about["version"] != VERSION:
-        raise ValueError(f"{path}: version {about['version']}; allowed: {VERSION}, which this jrcjax reads")
-    return about
+@contextlib.contextmanager
+def opened(path: str | os.PathLike) -> Iterator[tuple[Any, dict[str, Any]]]:
+    """An open file of agents, and what it says of itself.
+
+    Raises:
+      FileNotFoundError: if there is no such file.
+      ValueError: if it is no file of agents, damaged or of another version.
+    """
+    from safetensors import SafetensorError, safe_open  # here, since importing the package needs it for nothing else
+
+    try:
+        with safe_open(path, "numpy") as file:
+            metadata = file.metadata() or {}
+            if ABOUT not in metadata:
+                raise ValueError(f"{path}: a safetensors file without agents; allowed: one that save_agent wrote")
+            about = json.loads(metadata[ABOUT])
+            if about["version"] != VERSION:
+                raise ValueError(f"{path}: version {about['version']}; allowed: {VERSION}, which this jrcjax reads")
+            yield file, about
+    except SafetensorError as error:
+        raise ValueError(f"{path}: damaged, or not a file that save_agent wrote ({error})") from None
 
 
 def _chosen(field: str, value: Any, there: list[Any]) -> Any:
@@ -233,7 +243,7 @@ def _write(path: Path, tensors: dict[str, np.ndarray], about: dict[str, Any]) ->
     """Writes a file under a temporary name, syncs it, and gives it its name."""
     from safetensors.numpy import save
 
-    content = save({name: np.ascontiguousarray(array) for name, array in tensors.items()}, {_ABOUT: json.dumps(about)})
+    content = save({name: np.ascontiguousarray(array) for name, array in tensors.items()}, {ABOUT: json.dumps(about)})
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".", suffix=path.suffix)
     try:
         with os.fdopen(handle, "wb") as file:

@@ -38,6 +38,8 @@ class Run:
     """Continue where an earlier run with the same configuration stopped."""
     smoke: bool = False
     """A tiny version of the sweep."""
+    save_agents: bool = False
+    """Save the trained agents beside the results, for jrcjax.load_agent."""
     custom: tyro.conf.OmitArgPrefixes[Options] = field(default_factory=Options)
 
 
@@ -69,7 +71,8 @@ def main(args: list[str] | None = None) -> int:
         size.check()
         own = _own(command, (*SWEEPS, SOURCE.name))
         sweep = own.sweep if own else SWEEPS[command.name]
-        folder = run_sweep(sweep, size, command.out, console, resume=command.resume)
+        options = {"resume": command.resume, "save_agents": command.save_agents}
+        folder = run_sweep(sweep, size, command.out, console, **options)
         written = custom.write(folder, own, size.seeds) if own else []
     except (ValueError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
