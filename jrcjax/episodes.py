@@ -13,12 +13,13 @@ import jax
 import jax.numpy as jnp
 
 from jrcjax import exploration, metrics, rng, slot
+from jrcjax.divergence import has_diverged
 from jrcjax.exact import evaluate_policy
 from jrcjax.hparams import Config, HParams
 from jrcjax.learners import Learner, LearnerFactory, Source, Spec, make_learner
 from jrcjax.params import EnvParams
 from jrcjax.replay import Transition
-from jrcjax.types import Float, Int, Key, Words
+from jrcjax.types import Bool, Float, Int, Key, Words
 
 _INIT, _EPISODES = 0, 1  # purposes of an agent's key
 
@@ -32,7 +33,7 @@ class AgentState(NamedTuple):
 
 
 class Log(NamedTuple):
-    """Per episode, [episodes]; the last three are exact and belong to the policy without exploration."""
+    """Per episode, [episodes]; policy figures are exact and belong to the policy without exploration."""
 
     reward: Float
     """Mean reward per slot."""
@@ -46,6 +47,8 @@ class Log(NamedTuple):
     """Its packets per slot."""
     policy_miss_detection: Float
     """Its miss detection."""
+    diverged: Bool
+    """Whether the learner's values have diverged at the episode's end, see `jrcjax.divergence`."""
 
 
 def spec_of(env_params: EnvParams) -> Spec:
@@ -114,8 +117,12 @@ def run_episode(
     (_, learner_state, sums), _ = jax.lax.scan(
         one_slot, start, (of_slots, learner.draw(of_updates, numbers), numbers, jnp.arange(slots))
     )
+    simulated = (metrics.average_reward(sums), metrics.throughput(sums), metrics.miss_detection(sums))
     exact = evaluate_policy(env_params, learner.policy(learner_state))
-    log = Log(metrics.average_reward(sums), metrics.throughput(sums), metrics.miss_detection(sums), *exact)
+    diverged = jnp.bool_(False)
+    if learner.values is not None:
+        diverged = has_diverged(learner.values(learner_state), env_params, hparams.discount)
+    log = Log(*simulated, *exact, diverged)
     return AgentState(agent.key, learner_state), log
 
 

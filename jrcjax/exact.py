@@ -27,6 +27,7 @@ __all__ = [
     "evaluate_policy",
     "expected_reward",
     "greedy_policy",
+    "largest_reward",
     "level_transition",
     "miss_table",
     "optimal_policy",
@@ -99,6 +100,17 @@ def expected_reward(params: EnvParams) -> Float:
     is_data, packets, miss = _is_data(params)[None], packet_table(params), miss_table(params)[None]
     given = [reward(is_data, jnp.bool_(e), packets, miss, params.reward_weights) for e in (True, False)]
     return p * given[0] + (1.0 - p) * given[1]
+
+
+def largest_reward(params: EnvParams) -> Float:
+    """Max |rho_t| over states, actions, events and miss ratios, a scalar; equation (11) is linear in the miss ratio."""
+    is_data, packets = _is_data(params)[None], packet_table(params)
+    extremes = [
+        reward(is_data, jnp.bool_(event), packets, jnp.float32(miss), params.reward_weights)
+        for event in (True, False)
+        for miss in (0.0, 1.0)
+    ]
+    return jnp.abs(jnp.stack(extremes)).max()
 
 
 def value_iteration(params: EnvParams, gamma: Float | float = 0.99, tolerance: float = 1e-4) -> Float:

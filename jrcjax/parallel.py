@@ -30,14 +30,16 @@ _XLA_FLAGS = {
 
 
 def use_all_cores() -> None:
-    """Makes one JAX device per core, and lets XLA use the cores' vector instructions.
+    """Makes one JAX device per core, at least two, and lets XLA use the cores' vector instructions.
 
-    Call it before any array is made; on an accelerator it changes nothing. Flags that XLA_FLAGS has already are left.
+    XLA compiles other code for a single device, which rounds differently; with two on one core numbers are those of
+    any other number of cores. Call it before any array is made; on an accelerator it changes nothing. Flags that
+    XLA_FLAGS has already are left.
     """
     given = os.environ.get("XLA_FLAGS", "")
     added = [f"{name}={value}" for name, value in _XLA_FLAGS.items() if name not in given]
     os.environ["XLA_FLAGS"] = " ".join([given, *added]).strip()
-    jax.config.update("jax_num_cpu_devices", usable_cores())
+    jax.config.update("jax_num_cpu_devices", max(usable_cores(), 2))
 
 
 def keep_compiled() -> None:
@@ -68,6 +70,16 @@ def pad_agents(tree: Any, count: int) -> Any:
         return jnp.concatenate([leaf, jnp.repeat(leaf[-1:], count - leaf.shape[0], axis=0)])
 
     return jax.tree.map(pad, tree)
+
+
+def groups(tree: Any) -> list[Any]:
+    """Agents in groups that give each device one block, the last of them padded by `pad_agents`.
+
+    A function compiled for such a group is the same code for any number of agents, and so are an agent's bits.
+    """
+    count, size = jax.tree.leaves(tree)[0].shape[0], padded(1)
+    whole = pad_agents(tree, padded(count))
+    return [jax.tree.map(lambda leaf, i=i: leaf[i : i + size], whole) for i in range(0, padded(count), size)]
 
 
 def over_agents(function: Callable, block: int = BLOCK, *, in_place: bool = False) -> Callable:

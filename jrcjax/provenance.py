@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 _PACKAGES = ("jrcjax", "jax", "jaxlib", "flax", "optax", "chex", "distrax", "numpy", "scipy", "xarray")
+_VECTOR_FLAGS = ("avx", "fma", "f16c", "amx", "asimd", "sve")
 
 
 def versions() -> dict[str, str]:
@@ -28,17 +29,28 @@ def usable_cores() -> int:
 
 
 def machine() -> dict[str, Any]:
-    """Processor, usable cores and operating system."""
-    return {"cpu": _cpu_name(), "cores": usable_cores(), "system": platform.system()}
+    """Processor, its vector instructions, for which XLA generates code, usable cores and operating system."""
+    return {
+        "cpu": _cpuinfo("model name") or platform.processor() or platform.machine(),
+        "cpu_features": cpu_features(),
+        "cores": usable_cores(),
+        "system": platform.system(),
+    }
 
 
-def _cpu_name() -> str:
+def cpu_features() -> list[str]:
+    """Vector instructions of the processor (fma, avx2, avx512f, ...); empty where the system does not tell."""
+    flags = (_cpuinfo("flags") or _cpuinfo("Features")).split()
+    return sorted(flag for flag in flags if flag.startswith(_VECTOR_FLAGS))
+
+
+def _cpuinfo(field: str) -> str:
+    """The value of a field of the first processor; empty if there is none."""
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:
-        return platform.processor() or platform.machine()
-    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else platform.machine()
+        return ""
+    return next((line.split(":", 1)[1].strip() for line in lines if line.startswith(field)), "")
 
 
 def provenance() -> dict[str, Any]:

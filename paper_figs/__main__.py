@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import sys
 from dataclasses import dataclass
@@ -42,7 +43,7 @@ def make_figures(numbers: tuple[int, ...], size: Size, out: Path, console: Conso
     Raises:
       ValueError: unknown figures, bad sizes, or results of another configuration in `out`.
     """
-    from paper_figs import claims, report, style
+    from paper_figs import claims, divergence, report, style
     from paper_figs.figures import FIGURES, NUMBERS
     from sweeps import store
     from sweeps.estimate import in_words
@@ -60,7 +61,7 @@ def make_figures(numbers: tuple[int, ...], size: Size, out: Path, console: Conso
     console.print(
         f"{len(wanted)} figures, {size.seeds} seeds, {size.episodes} episodes: about {in_words(seconds)} in all"
     )
-    written, pictures, judgements, optima, manifests = [], {}, [], [], {}
+    written, pictures, judgements, optima, diverged, manifests = [], {}, [], [], [], {}
     for figure in wanted:
         folder = run_sweep(SWEEPS[figure.name], size, results, console, resume=True)
         data = store.load(folder, size.seeds)
@@ -69,10 +70,12 @@ def make_figures(numbers: tuple[int, ...], size: Size, out: Path, console: Conso
         files = style.save(figure.draw(table, figure.title), out / figure.name)
         written += [out / f"{figure.name}.csv", *files]
         pictures[figure.title] = files[-1]
-        judgements += figure.claims(data)
+        lost = divergence.rows(figure.name, data)
+        judgements += [dataclasses.replace(claim, n_diverged=len(lost)) for claim in figure.claims(data)]
+        diverged += lost
         optima += report.optimum_rows(figure.name, data)
         manifests[figure.name] = (folder / store.MANIFEST).read_text()
-    page = report.render(size, pictures, judgements, optima, manifests)
+    page = report.render(size, pictures, judgements, optima, diverged, manifests)
     texts = {"claims.json": json.dumps(claims.as_json(judgements), indent=2) + "\n", "report.html": page}
     for name, text in texts.items():
         (out / name).write_text(text)

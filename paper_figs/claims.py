@@ -41,6 +41,8 @@ class Judgement:
     n_seeds: int
     figure: str
     """The figure that the verdict rests on."""
+    n_diverged: int = 0
+    """Agents in that figure's results whose values diverged; they count like all others."""
 
 
 def verdict_of(low: float, high: float, relation: str, limit: float) -> str:

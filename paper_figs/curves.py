@@ -8,17 +8,17 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from paper_figs import style
+from paper_figs import divergence, style
 from paper_figs.statistics import bins_of, mean_over_seeds
 
-COLUMNS = ["figure", "panel", "algorithm", "x", "mean", "ci_low", "ci_high", "n_seeds"]
+COLUMNS = ["figure", "panel", "algorithm", "x", "mean", "ci_low", "ci_high", "n_seeds", "n_diverged"]
 
 
 def table(data: xr.Dataset, figure: str, panel: str, points: dict[str, int] | None = None) -> pd.DataFrame:
     """The plotted numbers: mean reward per slot in bins of consecutive episodes, over seeds; and three exact lines.
 
     `x` is the last episode of a bin. The interval is Student's t at 95 % over seeds. The exact lines have no seeds
-    (n_seeds 0) and their interval is themselves.
+    (n_seeds 0) and their interval is themselves. `n_diverged` of the seeds' agents diverged at some time.
 
     Args:
       data: results of a sweep.
@@ -35,16 +35,17 @@ def table(data: xr.Dataset, figure: str, panel: str, points: dict[str, int] | No
         curves = {name: (data["algorithm"].values[0], point) for name, point in points.items()}
     for name, (algorithm, point) in curves.items():
         reward = data["reward"].sel(algorithm=algorithm).isel(point=point).transpose("seed", "episode").values
+        n_diverged = divergence.count(data, algorithm, point)
         mean = mean_over_seeds(reward.reshape(reward.shape[0], -1, width).mean(axis=2))
         rows += [
-            (figure, panel, name, int(e), m, low, high, mean.n_seeds)
+            (figure, panel, name, int(e), m, low, high, mean.n_seeds, n_diverged)
             for e, m, low, high in zip(x, mean.mean, mean.low, mean.high, strict=True)
         ]
     for name in style.EXACT:
         reward = data[f"{name}_reward"].isel(point=0)
         reward = reward.values if "episode" in reward.dims else np.full(episodes, float(reward))
         rows += [
-            (figure, panel, name, int(e), r, r, r, 0)
+            (figure, panel, name, int(e), r, r, r, 0, 0)
             for e, r in zip(x, reward.reshape(-1, width).mean(axis=1), strict=True)
         ]
     return pd.DataFrame(rows, columns=COLUMNS)

@@ -7,7 +7,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from jrcjax.params import EnvParams
-from paper_figs import style
+from paper_figs import divergence, style
 from paper_figs.curves import COLUMNS
 from paper_figs.statistics import mean_over_seeds
 
@@ -24,7 +24,7 @@ def table(data: xr.Dataset, figure: str, x_name: str, slots: int = _SLOTS) -> pd
     """The plotted numbers: means over all episodes, exploration included, and over seeds; and three exact lines.
 
     The interval is Student's t at 95 % over seeds. The exact lines have no seeds (n_seeds 0) and their interval is
-    themselves.
+    themselves. `n_diverged` of the seeds' agents diverged at some time.
 
     Args:
       data: results of a sweep.
@@ -38,12 +38,13 @@ def table(data: xr.Dataset, figure: str, x_name: str, slots: int = _SLOTS) -> pd
         for name in data["algorithm"].values:
             values = data[metric].sel(algorithm=name).mean("episode").transpose("seed", "point").values
             mean = mean_over_seeds(values)
-            numbers = zip(x, mean.mean, mean.low, mean.high, strict=True)
-            rows += [(figure, panel, name, *row, mean.n_seeds) for row in numbers]
+            n_diverged = [divergence.count(data, name, point) for point in range(len(x))]
+            numbers = zip(x, mean.mean, mean.low, mean.high, n_diverged, strict=True)
+            rows += [(figure, panel, name, *row, mean.n_seeds, n) for *row, n in numbers]
         for name in style.EXACT:
             value = data[f"{name}_{metric}"]
             value = (scale or slots) * (value.mean("episode") if "episode" in value.dims else value).values
-            rows += [(figure, panel, name, e, v, v, v, 0) for e, v in zip(x, value, strict=True)]
+            rows += [(figure, panel, name, e, v, v, v, 0, 0) for e, v in zip(x, value, strict=True)]
     return pd.DataFrame(rows, columns=COLUMNS)
 
 

@@ -25,7 +25,12 @@ def optimum_rows(sweep: str, data: xr.Dataset) -> list[dict[str, Any]]:
 
 
 def render(
-    size: Size, pictures: dict[str, Path], claims: list[Judgement], optima: list[dict], manifests: dict[str, str]
+    size: Size,
+    pictures: dict[str, Path],
+    claims: list[Judgement],
+    optima: list[dict],
+    diverged: list[dict],
+    manifests: dict[str, str],
 ) -> str:
     """The page.
 
@@ -34,6 +39,7 @@ def render(
       pictures: title to PNG file.
       claims: verdicts.
       optima: rows of `optimum_rows`.
+      diverged: rows of `divergence.rows`.
       manifests: sweep name to its manifest's text.
     """
     embedded = [
@@ -41,4 +47,6 @@ def render(
     ]
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
     template = environment.from_string(_TEMPLATE.read_text())
-    return template.render(size=size, pictures=embedded, claims=claims, optima=optima, manifests=manifests)
+    return template.render(
+        size=size, pictures=embedded, claims=claims, optima=optima, diverged=diverged, manifests=manifests
+    )

@@ -63,7 +63,9 @@ def plot(axes: Axes, curve: pd.DataFrame, look: Look, markers: int) -> None:
 def band_of(numbers: pd.DataFrame) -> str:
     """What a figure's title says of its seeds and bands."""
     seeds = int(numbers.n_seeds.max())
-    return f"{seeds} seeds, bands: 95 % interval of the mean" if seeds > 1 else "one seed, no interval"
+    diverged = int(numbers.drop_duplicates(["algorithm", "x"]).groupby("algorithm").n_diverged.max().sum())
+    note = f"; up to {diverged} diverged agents at a point" if diverged else ""
+    return (f"{seeds} seeds, bands: 95 % interval of the mean" if seeds > 1 else "one seed, no interval") + note
 
 
 def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:

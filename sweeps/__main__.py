@@ -43,7 +43,21 @@ class Run:
     custom: tyro.conf.OmitArgPrefixes[Options] = field(default_factory=Options)
 
 
-Command = Annotated[List, tyro.conf.subcommand("list")] | Annotated[Run, tyro.conf.subcommand("run")]
+@dataclass(frozen=True)
+class Verify:
+    """Compute parts of results anew and compare them bit for bit; exit status 1 if anything differs."""
+
+    folder: tyro.conf.Positional[Path]
+    """Folder of one sweep's parts, such as out/results/fig6."""
+    parts: int | None = None
+    """How many parts, evenly spread. Default: all."""
+
+
+Command = (
+    Annotated[List, tyro.conf.subcommand("list")]
+    | Annotated[Run, tyro.conf.subcommand("run")]
+    | Annotated[Verify, tyro.conf.subcommand("verify")]
+)
 
 
 def main(args: list[str] | None = None) -> int:
@@ -66,6 +80,8 @@ def main(args: list[str] | None = None) -> int:
         print(f"{CUSTOM:12s} one of your own: run custom --vary PATH=VALUES")
         return 0
     try:
+        if isinstance(command, Verify):
+            return _verify(command)
         choice("name", command.name, (*SWEEPS, CUSTOM))
         size = size_of(command.seeds, command.episodes, command.preset, command.smoke)
         size.check()
@@ -89,6 +105,21 @@ def _own(command: Run, taken: tuple[str, ...]) -> Custom | None:
     if given:
         refuse("name", command.name, f"{CUSTOM}, for which alone --{given[0]} is")
     return None
+
+
+def _verify(command: Verify) -> int:
+    """Prints what differs; returns the exit status."""
+    from sweeps import verify
+    from sweeps.registry import SWEEPS
+    from sweeps.sources import SOURCE
+
+    differ = 0
+    for part, differences in verify.verify(command.folder, command.parts, SWEEPS | {SOURCE.name: SOURCE}):
+        differ += bool(differences)
+        print(f"{part.path}: {'differs' if differences else 'the same, bit for bit'}")
+        for line in differences and [*differences, *verify.made_elsewhere(part)]:
+            print(f"  {line}")
+    return min(differ, 1)
 
 
 if __name__ == "__main__":

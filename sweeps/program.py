@@ -31,9 +31,13 @@ class Progress(NamedTuple):
     """Episodes in the chunk."""
     log: dict[str, Log]
     """By learner: [points, seeds, episodes] each."""
-    agents: dict[str, AgentState]
-    """By learner, after the chunk, gone with the next; the leading axis of every leaf is lanes, of which the first
-    points x seeds count."""
+    groups: list[dict[str, AgentState]]
+    """Agents by learner after the chunk, gone with the next, in groups of lanes that fill the devices."""
+
+    @property
+    def agents(self) -> dict[str, AgentState]:
+        """All groups together; the leading axis of every leaf is lanes, of which the first points x seeds count."""
+        return jax.tree.map(lambda *leaves: jnp.concatenate(leaves), *self.groups)
 
 
 class Points(NamedTuple):
@@ -132,7 +136,9 @@ def run_block(sweep: Sweep, size: Size, points: Points, seeds: range, source: So
     """Runs some seeds of a sweep at all of its points, one chunk of episodes after the other.
 
     A seed has the same key at every point and for every learner, in whatever block it runs: that of `keys_of`, or its
-    `target_key` in a sweep that transfers, since the seed's source agent has the other.
+    `target_key` in a sweep that transfers, since the seed's source agent has the other. Lanes advance in groups that
+    give each device one block, so the compiled code, and with it every bit of a seed's results, is the same whatever
+    seeds run beside it.
 
     Args:
       sweep: what to run.
@@ -146,14 +152,21 @@ def run_block(sweep: Sweep, size: Size, points: Points, seeds: range, source: So
     program = program_of(sweep.learners, spec, size.config, chunk)
     shape = (len(sweep.x_values), len(seeds))
     point, seed = (a.reshape(-1) for a in np.indices(shape))
-    lanes = parallel.padded(point.size)
     keys = keys_of(np.array(seeds)[seed])
     if sweep.transfers:
         keys = jax.vmap(target_key)(keys)
     of_lane: Any = jax.tree.map(lambda leaf: leaf[seed], source)
-    where = parallel.pad_agents(jnp.asarray(point), lanes)
-    state = program.start(points, (*parallel.pad_agents((keys, of_lane), lanes), where)), where
+    groups = [
+        (program.start(points, lanes), lanes[2]) for lanes in parallel.groups((keys, of_lane, jnp.asarray(point)))
+    ]
     for first in range(0, size.episodes, chunk):
-        state, log = program.advance((points, jnp.int32(first)), state)
-        unpadded = jax.tree.map(lambda a: np.asarray(a[: math.prod(shape)]).reshape(*shape, chunk), log)
-        yield Progress(chunk, unpadded, state[0])
+        advanced = [program.advance((points, jnp.int32(first)), group) for group in groups]
+        groups = [lanes for lanes, _ in advanced]
+        log = joined([log for _, log in advanced])
+        unpadded = jax.tree.map(lambda a: a[: math.prod(shape)].reshape(*shape, chunk), log)
+        yield Progress(chunk, unpadded, [agents for agents, _ in groups])
+
+
+def joined(groups: list[Any]) -> Any:
+    """Groups of lanes as one, in memory."""
+    return jax.tree.map(lambda *parts: np.concatenate([np.asarray(part) for part in parts]), *groups)

@@ -24,7 +24,7 @@ from jrcjax.source import source_of
 from sweeps import files, store
 from sweeps.estimate import seconds_per_episode
 from sweeps.parts import parts_of
-from sweeps.program import keys_of, points_of, reference_of, run_block
+from sweeps.program import joined, keys_of, points_of, reference_of, run_block
 from sweeps.sweep import Size, Sweep
 
 SOURCE = Sweep(
@@ -69,24 +69,36 @@ def sources_of(size: Size, seeds: range, out: Path, advance: Callable[[float], N
         # Sweeps that run at the same time share the folder: one trains, the others wait for its agents.
         with files.locked(folder, lambda held: print(f"{held}; waiting for its agents", file=sys.stderr)):
             if missing := missing_sources(size, seeds, out):
-                store.write_part(folder, missing, _trained(size, missing, advance))
+                store.write_part(folder, missing, trained(size, missing, advance)[1])
             store.write_manifest(folder)
     return _load(size, seeds, folder)
 
 
-def _trained(size: Size, seeds: range, advance: Callable[[float], None]) -> xr.Dataset:
+def trained(size: Size, seeds: range, advance: Callable[[float], None]) -> tuple[Source, xr.Dataset]:
+    """Trains the source agents of some seeds.
+
+    Args:
+      size: the preset and lengths of the runs.
+      seeds: the seeds.
+      advance: told how many of the expected seconds are done.
+
+    Returns:
+      Weights and demonstrations, every leaf with a leading axis of seeds, and what is kept of them on disk.
+    """
     points = points_of(SOURCE, size.preset)
     logs: list[Any] = []
-    agents: Any = None
+    groups: Any = None
     for chunk in run_block(SOURCE, size, points, seeds, None):
         logs.append(chunk.log)
-        agents = chunk.agents["ddqn"]
+        groups = chunk.groups
         advance(chunk.episodes * seconds_per_episode(SOURCE, len(seeds)))
     log = jax.tree.map(lambda *parts: np.concatenate(parts, axis=-1), *logs)
     hand_on = _hand_on(size.config, size.preset)
-    keys = parallel.pad_agents(keys_of(np.array(seeds)), parallel.padded(len(seeds)))
-    source = jax.tree.map(lambda leaf: leaf[: len(seeds)], hand_on(points, (keys, agents.learner)))
-    return store.dataset(SOURCE, size, seeds, log, reference_of(points, size.episodes)).assign(_variables(source))
+    keys = parallel.groups(keys_of(np.array(seeds)))
+    lanes = [(key, group["ddqn"].learner) for key, group in zip(keys, groups, strict=True)]
+    source = jax.tree.map(lambda leaf: leaf[: len(seeds)], joined([hand_on(points, group) for group in lanes]))
+    data = store.dataset(SOURCE, size, seeds, log, reference_of(points, size.episodes))
+    return source, data.assign(_variables(source))
 
 
 @functools.cache

@@ -29,8 +29,8 @@ from sweeps.program import Reference, points_of
 from sweeps.sweep import Size, Sweep
 
 __all__ = [
-    "MANIFEST", "ConfigurationMismatch", "check_folder", "configuration", "dataset", "digest_of", "finished_seeds",
-    "load", "part_path", "write_manifest", "write_part",
+    "MANIFEST", "ConfigurationMismatch", "check_configuration", "check_folder", "configuration", "dataset", "digest_of",
+    "finished_seeds", "load", "part_path", "write_manifest", "write_part",
 ]  # fmt: skip
 
 MANIFEST = "manifest.json"
@@ -82,12 +82,21 @@ def check_folder(folder: Path, sweep: Sweep, size: Size) -> None:
     for part in parts:
         if part.configuration.get("sweep") != sweep.name:
             files.set_aside(part.path, f"it is of the sweep {part.configuration.get('sweep')!r}")
-            continue
-        if differing := _differing(part.configuration, wanted):
-            raise ConfigurationMismatch(
-                f"{part.path} holds results of another configuration ({'; '.join(differing)}); "
-                "choose another --out, or remove the folder"
-            )
+        else:
+            check_configuration(part, wanted)
+
+
+def check_configuration(part: Part, wanted: dict[str, Any]) -> None:
+    """Refuses a part of another configuration than `wanted`.
+
+    Raises:
+      ConfigurationMismatch: naming each field that differs, with both values.
+    """
+    if differing := _differing(part.configuration, wanted):
+        raise ConfigurationMismatch(
+            f"{part.path} holds results of another configuration ({'; '.join(differing)}); "
+            "choose another --out, or remove the folder"
+        )
 
 
 def _differing(there: dict[str, Any], wanted: dict[str, Any], prefix: str = "") -> list[str]:
@@ -103,10 +112,16 @@ def _differing(there: dict[str, Any], wanted: dict[str, Any], prefix: str = "") 
 
 
 def dataset(sweep: Sweep, size: Size, seeds: range, log: dict[str, Log], exact: Reference) -> xr.Dataset:
-    """Results of some seeds with named dimensions: algorithm, point, seed, episode (from 1)."""
+    """Results of some seeds with named dimensions: algorithm, point, seed, episode (from 1).
+
+    `first_diverged` is the first episode after which an agent's values had diverged, -1 if there is none.
+    """
     dims = ("algorithm", "point", "seed", "episode")
     stacked = {name: np.stack([getattr(log[learner], name) for learner in sweep.learners]) for name in Log._fields}
+    diverged = stacked.pop("diverged")
+    first = np.where(diverged.any(axis=-1), diverged.argmax(axis=-1) + 1, -1)
     variables: dict[str, Any] = {name: (dims, values) for name, values in stacked.items()}
+    variables["first_diverged"] = (dims[:-1], first)
     for policy in Reference._fields:
         run: LongRun = getattr(exact, policy)
         values = {name: np.asarray(value) for name, value in run._asdict().items()}

@@ -11,9 +11,10 @@ import xarray as xr
 from scipy import stats
 
 from jrcjax import Log
-from paper_figs import claims, curves, learning_claims, points, statistics, style, sweep_claims
+from paper_figs import claims, curves, divergence, learning_claims, points, report, statistics, style, sweep_claims
 from paper_figs.__main__ import main
 from paper_figs.figures import FIGURES
+from sweeps.sweep import Size
 
 ALGORITHMS = ("ddqn", "q_learning", "round_robin")
 
@@ -27,6 +28,7 @@ def results(seeds=6, episodes=800, optimum=4.0, reward=None, policy=None):
     dims = ("algorithm", "point", "seed", "episode")
     noise = 0.01 * rng.standard_normal(shape)
     variables = {name: (dims, np.zeros((3, *shape))) for name in Log._fields}
+    variables["first_diverged"] = (dims[:3], np.full((3, *shape[:2]), -1))
     variables["reward"] = (dims, np.stack([reward[a] + noise for a in ALGORITHMS]))
     variables["policy_reward"] = (dims, np.stack([policy[a] + noise for a in ALGORITHMS]))
     variables["optimum_reward"] = (("point",), [optimum])
@@ -53,6 +55,7 @@ def test_table_holds_bin_means_over_seeds_and_the_exact_optimum():
     data = results()
     table = curves.table(data, "5", "a")
     assert list(table.columns) == curves.COLUMNS
+    assert set(table.n_diverged) == {0}
     ddqn = table[table.algorithm == "ddqn"]
     reward = data["reward"].sel(algorithm="ddqn").isel(point=0).values
     np.testing.assert_array_equal(ddqn.x, np.arange(8, 801, 8))
@@ -212,6 +215,7 @@ def swept(x_name, x_values, reward, packets=None, miss=None, seeds=6, episodes=6
     }
     gap = np.array([np.where(np.arange(episodes) >= 400 if a in slow else late, 0.01, 0.5) for a in algorithms])
     variables["policy_reward"] = (dims, 4.0 * (1 - gap[:, None, None, :]) + noise)
+    variables["first_diverged"] = (dims[:3], np.full(shape[:3], -1))
     for metric in ("reward", "throughput", "miss_detection"):
         variables[f"optimum_{metric}"] = (("point",), np.full(points_, 4.0))
         variables[f"constant_{metric}"] = (("point",), np.full(points_, 3.0))
@@ -350,3 +354,26 @@ def test_one_algorithm_at_two_points_gives_two_curves():
     table = curves.table(replay_world(true=True), "9", "", points={"tlwd": 0, "tlwd_uniform": 1})
     means = table.groupby("algorithm")["mean"].mean()
     np.testing.assert_allclose(means[["tlwd", "tlwd_uniform"]], [2.0, 1.0], atol=1e-3)
+
+
+def test_diverged_agents_are_counted_in_table_and_title_and_named_in_the_report():
+    data = results()
+    data["first_diverged"].loc[{"algorithm": "ddqn", "seed": [2, 5]}] = [3, 700]
+    table = curves.table(data, figure="5", panel="a")
+    assert set(table.query("algorithm == 'ddqn'").n_diverged) == {2}
+    assert set(table.query("algorithm != 'ddqn'").n_diverged) == {0}
+    assert style.band_of(table).endswith("of the mean; up to 2 diverged agents at a point")
+    rows = divergence.rows("fig5a", data)
+    agent = {"sweep": "fig5a", "algorithm": "ddqn", "point": 0}
+    assert rows == [agent | {"seed": 2, "episode": 3}, agent | {"seed": 5, "episode": 700}]
+    page = report.render(Size(), {}, [], [], rows, {})
+    assert "<td>ddqn</td>" in page
+    assert '<td class="number">700</td>' in page
+    assert "<p>None.</p>" in report.render(Size(), {}, [], [], [], {})
+
+
+def test_diverged_agents_are_counted_at_each_point():
+    data = swept("density", (8.0, 16.0), {"tlwd": [1.0, 2.0], "dpr": [1.0, 2.0]})
+    data["first_diverged"].loc[{"algorithm": "tlwd", "point": 1, "seed": 0}] = 1
+    table = points.table(data.assign_coords(point=[0, 1]), "8", "density")
+    assert table.query("n_diverged > 0")[["algorithm", "x"]].drop_duplicates().values.tolist() == [["tlwd", 16.0]]

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-ENVIRONMENT = {"slot", "environment", "exact"}
+ENVIRONMENT = {"slot", "environment", "exact", "divergence"}
 # What puts the parts together; modules of the package that are in none of these sets hold equations.
 TRAINING = {"__init__", "training", "parallel", "episodes", "source", "transfer", "adapters", "saved_agent", "saving"}
 COMMANDS = {"sweeps.__main__"}  # runs sweeps and has one drawn; nothing imports it

@@ -14,10 +14,12 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from sweeps import files, parts, sources, store
+from sweeps import files, parts, run, sources, store
+from sweeps.__main__ import main
 from sweeps.registry import SWEEPS
 from sweeps.run import run_sweep
 from sweeps.sweep import Size
+from sweeps.verify import made_elsewhere, sample_of, verify
 
 ROOT = Path(__file__).parents[1]
 QUIET = Console(quiet=True)
@@ -245,3 +247,102 @@ def test_results_are_the_same_after_twenty_kills(tmp_path):
     assert len(digests(whole)) == 40
     assert digests(killed) == digests(whole)
     assert {path.name for path in killed.iterdir()} == {path.name for path in whole.iterdir()}
+
+
+# --- Seeds, devices and verification ----------------------------------------------------------------------------------
+
+_ON_DEVICES = """
+import sys
+from pathlib import Path
+from jrcjax import parallel
+parallel.use_all_cores()
+parallel.keep_compiled()
+import jax
+if int(sys.argv[1]):
+    jax.config.update("jax_num_cpu_devices", int(sys.argv[1]))
+import dataclasses
+from rich.console import Console
+from sweeps import run
+from sweeps.registry import SWEEPS
+from sweeps.sweep import Size
+ddqn = dataclasses.replace(SWEEPS["fig5a"], learners=("ddqn",))
+run.run_sweep(ddqn, Size(seeds=int(sys.argv[2]), episodes=2), Path(sys.argv[3]), Console(quiet=True), resume=False)
+"""
+
+
+def on_devices(devices: int, seeds: int, out: Path, pinned: bool = False) -> Path:
+    command = [sys.executable, "-c", _ON_DEVICES, str(devices), str(seeds), str(out)]
+    one_core = (lambda: os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})) if pinned else None
+    subprocess.run(command, cwd=ROOT, check=True, preexec_fn=one_core)
+    return out / "fig5a"
+
+
+@pytest.mark.slow
+def test_a_seed_has_the_same_bits_on_two_devices_three_and_a_single_core(tmp_path):
+    """Two blocks of seeds on two devices, one and a half on three, and what `use_all_cores` makes of one core."""
+    two = on_devices(2, 35, tmp_path / "two")
+    three = on_devices(3, 35, tmp_path / "three")
+    one_core = on_devices(0, 3, tmp_path / "one", pinned=True)
+    assert digests(two) == digests(three)
+    a, b = (store.load(folder, 3).drop_attrs() for folder in (two, one_core))
+    assert a.identical(b)
+    assert len(np.unique(store.load(two, 35)["reward"].values[0, 0], axis=0)) == 35
+
+
+@pytest.mark.parametrize("seeds", [range(2, 3), range(1, 4), range(0, 40)])
+def test_a_seed_has_the_same_bits_alone_and_among_others(seeds, untouched):
+    size = replace(SIZE, seeds=seeds.stop)
+    points = run.points_of(CHEAP, size.preset)
+    reference = run.reference_of(points, size.episodes)
+    data = run.results_of(CHEAP, size, points, reference, seeds, None, lambda seconds: None)
+    common = sorted(set(seeds) & set(range(3)))
+    there = store.load(untouched, 3).sel(seed=common)
+    assert data.sel(seed=common).drop_attrs().identical(there.drop_attrs())
+
+
+def test_verifying_finds_results_that_can_be_reproduced(untouched, capsys):
+    assert [found for _, found in verify(untouched, None, {"cheap": CHEAP})] == [[]]
+
+
+def test_verifying_says_where_and_how_much_results_differ(folder, monkeypatch, capsys):
+    part = store.part_path(folder, range(3))
+    data = parts.read_part(part)
+    data["reward"][0, 0, 1, 0] += 0.5
+    data["miss_detection"][0, 0, 2, 0] = np.nan
+    store.write_part(folder, range(3), data)
+    monkeypatch.setitem(SWEEPS, "cheap", CHEAP)
+    assert main(["verify", str(folder)]) == 1
+    out = capsys.readouterr().out
+    assert f"{part}: differs" in out
+    assert "reward: 1 of 3 entries differ, by at most 0.5, first at algorithm round_robin, point 0, seed 1" in out
+    assert "miss_detection: 1 of 3 entries differ, by at most nan" in out
+    assert main(["verify", str(folder.parent / "nothing")]) == 2
+    assert "folder: " in capsys.readouterr().err
+
+
+def test_verifying_refuses_results_of_another_configuration(folder):
+    changed = replace(CHEAP, x_values=(1.0,))
+    with pytest.raises(store.ConfigurationMismatch, match=r"x\.environment: \[0\.0\] there, \[1\.0\] wanted"):
+        verify(folder, None, {"cheap": changed})
+    with pytest.raises(ValueError, match="results of the sweep 'cheap'"):
+        verify(folder, None, {})
+
+
+def test_sampled_parts_are_spread_from_first_to_last():
+    held = [parts.Part(Path(str(i)), range(i, i + 1), {}, {}, "") for i in range(10)]
+    for number, wanted in ((1, [0]), (2, [0, 9]), (3, [0, 4, 9]), (10, list(range(10))), (99, list(range(10)))):
+        assert [part.seeds.start for part in sample_of(held, number)] == wanted
+    for bad in (0, -1, True, 1.5):
+        with pytest.raises(ValueError, match="parts: "):
+            sample_of(held, bad)
+
+
+def test_results_name_what_decides_their_last_bit(folder):
+    made = parts.parts_of(folder)[0].provenance
+    assert {"command", "versions", "machine", "git_commit", "git_modified"} <= made.keys()
+    assert {"jrcjax", "jaxlib"} <= made["versions"].keys()
+    assert set(made["machine"]["cpu_features"]) <= set(Path("/proc/cpuinfo").read_text().split())
+    part = parts.parts_of(folder)[0]
+    assert made_elsewhere(part) == []
+    made["machine"]["cpu_features"] = ["fma"]
+    assert made_elsewhere(part)[0].startswith("cpu_features: ['fma'] there, ")

@@ -47,6 +47,8 @@ class Learner(NamedTuple):
     """(learner state, transition, slot, what `draw` made of the slot's words, hparams) to the next learner state."""
     policy: Callable[[State], Float]
     """Learner state to the policy without exploration, [S, A] probabilities."""
+    values: Callable[[State], Float] | None = None
+    """Learner state to Q(s, a), [S, A], by which divergence is noticed; None for learners without values."""
     draw: Callable[[Words, Int], Any] = lambda words, slots: words
     """(words of `update` [slots, words], numbers of the slots [slots]) to what `update` is given per slot; leaves have
     a leading axis of slots. What needs nothing but words costs less for a whole episode at once."""

@@ -72,6 +72,7 @@ def ddqn(spec: Spec, config: Config) -> Learner:
         act=act,
         update=update,
         policy=lambda state: greedy_policy(function.table(state.weights)),
+        values=lambda state: function.table(state.weights),
         draw=draw,
     )
 

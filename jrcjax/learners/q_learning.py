@@ -45,4 +45,6 @@ def q_learning(spec: Spec, config: Config) -> Learner:
         error = q_learning_error(state.q, s, a, reward, next_state, discount)
         return QState(state.q.at[s, a].add(step * error), visits)
 
-    return Learner(exploration.NUM_WORDS, init, act, update, lambda state: greedy_policy(state.q))
+    return Learner(
+        exploration.NUM_WORDS, init, act, update, lambda state: greedy_policy(state.q), values=lambda state: state.q
+    )

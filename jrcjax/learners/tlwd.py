@@ -149,5 +149,6 @@ def tlwd(spec: Spec, config: Config) -> Learner:
         act=act,
         update=update,
         policy=lambda state: greedy_policy(function.table(state.weights)),
+        values=lambda state: function.table(state.weights),
         needs_source=True,
     )
