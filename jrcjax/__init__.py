@@ -10,7 +10,10 @@ from jrcjax.episodes import AgentState, Log
 from jrcjax.hparams import Config, HParams
 from jrcjax.learners import Source
 from jrcjax.params import EnvParams, check_params
+from jrcjax.params_file import load_params, save_params
 from jrcjax.presets import paper_params
+from jrcjax.saved_agent import Evaluation, SavedAgent
+from jrcjax.saving import load_agent, save_agent, save_agents
 from jrcjax.source import train_source
 from jrcjax.training import train, train_agents
 from jrcjax.transfer import Transfer, transfer
@@ -18,6 +21,7 @@ from jrcjax.transfer import Transfer, transfer
 __version__ = "0.1.0"
 
 __all__ = [
-    "AgentState", "Config", "EnvParams", "EnvState", "HParams", "JRCEnv", "Log", "Source", "Transfer", "check_params",
-    "events", "exact", "paper_params", "radar", "train", "train_agents", "train_source", "transfer",
+    "AgentState", "Config", "EnvParams", "EnvState", "Evaluation", "HParams", "JRCEnv", "Log", "SavedAgent", "Source",
+    "Transfer", "check_params", "events", "exact", "load_agent", "load_params", "paper_params", "radar", "save_agent",
+    "save_agents", "save_params", "train", "train_agents", "train_source", "transfer",
 ]  # fmt: skip

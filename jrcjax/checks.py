@@ -59,10 +59,11 @@ def require_type(field: str, value: Any, wanted: type) -> None:
 
 
 def as_array(field: str, value: Any, allowed: str) -> np.ndarray:
-    """Plain numbers as a float32 array."""
+    """Plain numbers as a float32 array; those too large for it become infinite."""
     try:
-        return np.asarray(value, np.float32)
-    except (TypeError, ValueError):
+        with np.errstate(over="ignore"):
+            return np.asarray(value, np.float32)
+    except (TypeError, ValueError, OverflowError):
         refuse(field, str(value), allowed)
 
 

@@ -47,6 +47,11 @@ def boxes(footprints: Footprints, distance: Int) -> Boxes:
       footprints: N objects.
       distance: index into DISTANCES, a scalar.
     """
+    return _sorted_boxes(footprints, distance)[0]
+
+
+def _sorted_boxes(footprints: Footprints, distance: Int) -> tuple[Boxes, Int]:
+    """`boxes`, and the indices [N] of the objects that they belong to."""
     x, y = footprints.centre[:, 0], footprints.centre[:, 1]
     radial = distance == 2
     extent = jnp.where(distance == 0, footprints.size / 2.0, 0.0)
@@ -56,7 +61,7 @@ def boxes(footprints: Footprints, distance: Int) -> Boxes:
     order, quantum = _order(along, footprints.present)
     absent = 1e9 * (1.0 + jnp.arange(x.shape[0], dtype=jnp.float32))
     along = jnp.where(footprints.present, along, absent)
-    return Boxes(across[order], along[order], extent[order, 0], extent[order, 1], quantum)
+    return Boxes(across[order], along[order], extent[order, 0], extent[order, 1], quantum), order
 
 
 def _order(along: Float, present: Bool) -> tuple[Int, Float]:
@@ -164,6 +169,12 @@ def cluster_label(box: Boxes, resolution: Float) -> Int:
 
     start = jnp.broadcast_to(jnp.arange(n, dtype=jnp.int32), box.x.shape)
     return jax.lax.while_loop(lambda carry: carry[1], round_, (start, jnp.bool_(True)))[0]
+
+
+def merged_objects(footprints: Footprints, resolution: Float, distance: Int) -> Bool:
+    """Which of N objects are unresolved from at least one other, [N]; arguments as for `detected_objects`."""
+    box, order = _sorted_boxes(footprints, distance)
+    return jnp.zeros(order.shape, bool).at[order].set(is_merged(box, resolution))
 
 
 def detected_objects(footprints: Footprints, resolution: Float, distance: Int, rule: Int) -> Int:

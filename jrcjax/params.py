@@ -102,12 +102,17 @@ def check_params(params: EnvParams) -> None:
     Raises:
       ValueError: naming the field, the value and what is allowed.
     """
+    check_all_but_radar(params)
+    check_radar(params.radar)
+    check_bank(params.radar)
+
+
+def check_all_but_radar(params: EnvParams) -> None:
+    """`check_params` for parameters whose radar, with its bank, is still to be built."""
     require_type("params", params, EnvParams)
     check_channel(params.channel)
     for name in FACTORS[1:]:
         check_factor(name, getattr(params, name))
-    check_radar(params.radar)
-    check_bank(params.radar)
     weights = "four weights >= 0 (rho_1 to rho_4), of a signed type"
     require("reward_weights", params.reward_weights, (4,), is_not_negative, weights, kinds="if")
     require_reading("event_model", params.event_model, EVENT_MODELS)

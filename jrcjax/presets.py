@@ -20,7 +20,7 @@ _CARS, _PEDESTRIANS = 20, 7  # mean numbers per slot in nuScenes, from which the
 _RANGES = (225.0, 45.0)  # m, long and short range
 _BANDWIDTHS = (300e6, 750e6)  # Hz
 _SLOPES = (10e12, 15e12)  # Hz/s
-_MAX_DENSITY = 54.0  # objects per 45 m x 45 m, the largest in the paper
+MAX_DENSITY = 54.0  # objects per 45 m x 45 m, the largest in the paper
 
 
 def _db(value: float) -> float:
@@ -48,7 +48,7 @@ def _paper_radar(density: float) -> Radar:
             class_share=(_CARS / total, _PEDESTRIANS / total),
             size_mean=((4.62, 1.92), (0.73, 0.68)),
             size_std=((0.18, 0.08), (0.085, 0.055)),
-            max_density=_MAX_DENSITY,
+            max_density=MAX_DENSITY,
         )
 
 

@@ -16,7 +16,16 @@ import numpy as np
 from flax import struct
 
 from jrcjax import rng
-from jrcjax.bank import BANK_FIELDS, bank_inputs, build_bank, fresh_miss_ratio, fresh_miss_ratio_of, mean_count
+from jrcjax.bank import (
+    BANK_FIELDS,
+    bank_inputs,
+    bank_key,
+    build_bank,
+    fresh_miss_ratio,
+    fresh_miss_ratio_of,
+    fresh_placement,
+    mean_count,
+)
 from jrcjax.checks import (
     as_array,
     is_distribution,
@@ -29,7 +38,7 @@ from jrcjax.checks import (
     require_reading,
     require_type,
 )
-from jrcjax.placement import ObjectClasses
+from jrcjax.placement import Footprints, ObjectClasses
 from jrcjax.types import COUNT_MODELS, COUNTING_RULES, DISTANCES, PLACEMENTS, Float, Int, Key, Words, choice
 
 _UNLIMITED = 2**31 - 1  # stands for slots that are still to be counted
@@ -249,6 +258,13 @@ def slot_miss_ratio(word: Words, mode: Int, radar: Radar) -> Float:
         return fresh_miss_ratio_of(jax.random.key(word), mode, radar)
     bank = radar.miss_bank
     return bank[mode, rng.index(word, bank.shape[-1])]
+
+
+def slot_placement(word: Words, mode: int, radar: Radar) -> tuple[Int, Footprints]:
+    """The placement whose miss ratio `slot_miss_ratio` gives for the same word; `mode` is static."""
+    if radar.placements == "fresh":
+        return fresh_placement(jax.random.key(word), mode, radar)
+    return fresh_placement(bank_key(radar, mode, rng.index(word, radar.miss_bank.shape[-1])), mode, radar)
 
 
 def mean_miss_ratio(radar: Radar) -> Float:

@@ -14,13 +14,13 @@ from paper_figs.statistics import mean_over_seeds
 _SLOTS = EnvParams.max_steps_in_episode
 PANELS = {
     "a": ("reward", "average reward per slot", 1),
-    "b": ("throughput", "throughput (packets per episode)", _SLOTS),
+    "b": ("throughput", "throughput (packets per episode)", None),
     "c": ("miss_detection", "miss-detection probability", 1),
 }
-"""Panel to the metric, its axis label, and what a long-run figure per slot is multiplied by."""
+"""Panel to the metric, its axis label, and what a long-run figure per slot is multiplied by: None for the slots."""
 
 
-def table(data: xr.Dataset, figure: str, x_name: str) -> pd.DataFrame:
+def table(data: xr.Dataset, figure: str, x_name: str, slots: int = _SLOTS) -> pd.DataFrame:
     """The plotted numbers: means over all episodes, exploration included, and over seeds; and three exact lines.
 
     The interval is Student's t at 95 % over seeds. The exact lines have no seeds (n_seeds 0) and their interval is
@@ -30,6 +30,7 @@ def table(data: xr.Dataset, figure: str, x_name: str) -> pd.DataFrame:
       data: results of a sweep.
       figure: the figure's number.
       x_name: the coordinate that varies between points.
+      slots: of an episode.
     """
     x = [float(value) for value in data[x_name].values]
     rows = []
@@ -42,7 +43,7 @@ def table(data: xr.Dataset, figure: str, x_name: str) -> pd.DataFrame:
             rows += [(figure, panel, name, *row, mean.n_seeds, n) for *row, n in numbers]
         for name in style.EXACT:
             value = data[f"{name}_{metric}"]
-            value = scale * (value.mean("episode") if "episode" in value.dims else value).values
+            value = (scale or slots) * (value.mean("episode") if "episode" in value.dims else value).values
             rows += [(figure, panel, name, e, v, v, v, 0, 0) for e, v in zip(x, value, strict=True)]
     return pd.DataFrame(rows, columns=COLUMNS)
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
 import tyro
 from rich.console import Console
 
-from sweeps.sweep import size_of
+from jrcjax.checks import refuse
+from sweeps.custom import CUSTOM, Custom, Options, custom_sweep
+from sweeps.sweep import Study, size_of
 
 
 @dataclass(frozen=True)
@@ -23,7 +25,7 @@ class Run:
     """Run one sweep or study; results go to OUT/NAME, with what a study concludes in OUT/NAME/summary."""
 
     name: tyro.conf.Positional[str]
-    """A sweep's or study's name, as `list` shows it."""
+    """A sweep's or study's name, as `list` shows it, or custom."""
     seeds: int | None = None
     """Independent seeds. Default: 10 (multiverse 4), or 2 with --smoke."""
     episodes: int | None = None
@@ -36,6 +38,9 @@ class Run:
     """Continue where an earlier run with the same configuration stopped."""
     smoke: bool = False
     """A tiny version of the sweep."""
+    save_agents: bool = False
+    """Save the trained agents beside the results, for jrcjax.load_agent."""
+    custom: tyro.conf.OmitArgPrefixes[Options] = field(default_factory=Options)
 
 
 @dataclass(frozen=True)
@@ -60,26 +65,33 @@ def main(args: list[str] | None = None) -> int:
     command = tyro.cli(Command, prog="python -m sweeps", args=args)
     from jrcjax import parallel  # after parsing, so that --help and errors come at once
     from jrcjax.types import choice
+    from paper_figs import custom
 
     parallel.use_all_cores()
     parallel.keep_compiled()
     from paper_figs.studies import SUMMARIES
-    from sweeps.registry import STUDIES
+    from sweeps.registry import EVERY_SWEEP, STUDIES
     from sweeps.run import run_sweep
 
     console = Console(stderr=True)
     if isinstance(command, List):
         for study in STUDIES.values():
             print(f"{study.name:12s} {study.description}")
+        print(f"{CUSTOM:12s} one of your own: run custom --vary PATH=VALUES")
         return 0
     try:
         if isinstance(command, Verify):
             return _verify(command)
-        choice("name", command.name, tuple(STUDIES))
-        study = STUDIES[command.name]
+        choice("name", command.name, (*STUDIES, CUSTOM))
+        own = _own(command, (*STUDIES, *EVERY_SWEEP))
+        study = Study(CUSTOM, "", (own.sweep,)) if own else STUDIES[command.name]
         size = size_of(command.seeds, command.episodes, command.preset, command.smoke, study)
+        size.check()
         sweeps = study.smoke_sweeps if command.smoke and study.smoke_sweeps else study.sweeps
-        written = [run_sweep(sweep, size, command.out, console, resume=command.resume) for sweep in sweeps]
+        options = {"resume": command.resume, "save_agents": command.save_agents}
+        written = [run_sweep(sweep, size, command.out, console, **options) for sweep in sweeps]
+        if own:
+            written += custom.write(written[0], own, size.seeds)
         if study.name in SUMMARIES:
             written += SUMMARIES[study.name](sweeps, size, command.out)
     except (ValueError, OSError) as error:
@@ -87,6 +99,16 @@ def main(args: list[str] | None = None) -> int:
         return 2
     print("\n".join(map(str, written)))
     return 0
+
+
+def _own(command: Run, taken: tuple[str, ...]) -> Custom | None:
+    """The sweep that the options of `run custom` describe; other sweeps refuse these options."""
+    if command.name == CUSTOM:
+        return custom_sweep(command.custom, command.preset, taken)
+    given = [name for name, value in vars(command.custom).items() if value != getattr(Options(), name)]
+    if given:
+        refuse("name", command.name, f"{CUSTOM}, for which alone --{given[0]} is")
+    return None
 
 
 def _verify(command: Verify) -> int:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any, TypeAlias
 
 import jax
 import numpy as np
@@ -11,14 +13,17 @@ import xarray as xr
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from jrcjax.episodes import Log
+from jrcjax.episodes import AgentState, Log
 from jrcjax.learners import Source
 from jrcjax.provenance import usable_cores
 from sweeps import estimate, files, store
+from sweeps.agents import check_agents, write_agents
 from sweeps.program import Points, Reference, points_of, reference_of, run_block
 from sweeps.sources import missing_sources, sources_of
 from sweeps.sweep import Size, Sweep
 
+Keep: TypeAlias = Callable[[dict[str, AgentState]], Any]
+"""What is done with a block's agents before its part is written."""
 _COLUMNS = (
     TextColumn("{task.description}"),
     BarColumn(),
@@ -62,7 +67,9 @@ def expected_seconds(sweeps: list[Sweep], size: Size, out: Path) -> float:
     return agents + sum(estimate.block_seconds(sweep, size, len(seeds)) for sweep in sweeps for seeds in todo[sweep])
 
 
-def run_sweep(sweep: Sweep, size: Size, out: Path, console: Console, *, resume: bool) -> Path:
+def run_sweep(
+    sweep: Sweep, size: Size, out: Path, console: Console, *, resume: bool, save_agents: bool = False
+) -> Path:
     """Runs what is missing of a sweep.
 
     Args:
@@ -71,12 +78,13 @@ def run_sweep(sweep: Sweep, size: Size, out: Path, console: Console, *, resume: 
       out: results go to `out / sweep.name`, source agents to the folder of `sweep.source`.
       console: where the expected time and the progress are shown.
       resume: continue in a folder that holds results of the same configuration.
+      save_agents: save the trained agents beside the results.
 
     Returns:
       The folder with the results.
 
     Raises:
-      ValueError: bad sizes, or a folder that already holds results.
+      ValueError: bad sizes, or a folder that already holds results, or holds some without their agents.
       FolderInUse: if another process writes to the folder.
     """
     size.check()
@@ -85,6 +93,8 @@ def run_sweep(sweep: Sweep, size: Size, out: Path, console: Console, *, resume: 
     finished = size.seeds - sum(map(len, todo))
     if finished and not resume:
         raise ValueError(f"{folder} holds results of {finished} seeds already; add --resume, or choose another --out")
+    if save_agents:
+        check_agents(folder, sweep)
     if not todo:
         console.print(f"{sweep.name}: all {size.seeds} seeds are there, in {folder}")
         store.write_manifest(folder)
@@ -92,18 +102,20 @@ def run_sweep(sweep: Sweep, size: Size, out: Path, console: Console, *, resume: 
     seconds = expected_seconds([sweep], size, out)
     console.print(_announcement(sweep, size, todo, seconds))
     with files.locked(folder):
-        _run_blocks(sweep, size, out, console, seconds)
+        _run_blocks(sweep, size, out, console, seconds, save_agents)
     return folder
 
 
-def _run_blocks(sweep: Sweep, size: Size, out: Path, console: Console, seconds: float) -> None:
+def _run_blocks(sweep: Sweep, size: Size, out: Path, console: Console, seconds: float, save_agents: bool) -> None:
     """Runs what is missing, as it is now that nobody else writes, and shows the progress of so many seconds."""
     points = points_of(sweep, size.preset)
     reference = reference_of(points, size.episodes)
     with Progress(*_COLUMNS, console=console) as progress:
         task = progress.add_task(sweep.name, total=seconds)
         for seeds in to_do(sweep, size, out):
-            _run_block(sweep, size, points, reference, seeds, out, lambda done: progress.advance(task, done))
+            keep = functools.partial(write_agents, out / sweep.name, sweep, size, points, seeds)
+            told = functools.partial(progress.advance, task)
+            _run_block(sweep, size, points, reference, seeds, out, told, keep if save_agents else None)
 
 
 def _announcement(sweep: Sweep, size: Size, todo: list[range], seconds: float) -> str:
@@ -122,11 +134,12 @@ def _run_block(
     seeds: range,
     out: Path,
     advance: Callable[[float], None],
+    keep: Keep | None = None,
 ) -> None:
     """Runs one block of seeds and writes its part; `advance` is told how many of the expected seconds are done."""
     source = sources_of(sweep.source, size, seeds, out, advance) if sweep.source else None
     folder = out / sweep.name
-    store.write_part(folder, seeds, results_of(sweep, size, points, reference, seeds, source, advance))
+    store.write_part(folder, seeds, results_of(sweep, size, points, reference, seeds, source, advance, keep))
     store.write_manifest(folder)
 
 
@@ -138,13 +151,21 @@ def results_of(
     seeds: range,
     source: Source | None,
     advance: Callable[[float], None],
+    keep: Keep | None = None,
 ) -> xr.Dataset:
-    """The results of one block of seeds; `advance` is told how many of the expected seconds are done."""
+    """The results of one block of seeds.
+
+    `advance` is told how many of the expected seconds are done, `keep` is given the agents after their last episode.
+    """
+    agents: dict[str, AgentState] = {}
     logs: list[dict[str, Log]] = []
     for chunk in run_block(sweep, size, points, seeds, source):
         if not logs:
             advance(estimate.pretraining_seconds(sweep, size, len(seeds)))
         logs.append(chunk.log)
+        agents = chunk.agents
         advance(chunk.episodes * estimate.seconds_per_episode(sweep, len(seeds)))
+    if keep:
+        keep(agents)
     whole = jax.tree.map(lambda *parts: np.concatenate(parts, axis=-1), *logs)
     return store.dataset(sweep, size, seeds, whole, reference)

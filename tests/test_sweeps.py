@@ -177,7 +177,7 @@ def test_command_line_errors_name_field_value_and_allowed(arguments, message, ca
 
 def test_list_names_every_sweep(capsys):
     assert main(["list"]) == 0
-    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == list(STUDIES)
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == [*STUDIES, "custom"]
 
 
 def test_options_overrule_the_smoke_size():

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from jrcjax.environment import EnvState, JRCEnv
+from jrcjax.adapters.gymnax_env import GymnaxEnv
+from jrcjax.environment import EnvState
 from jrcjax.params import EnvParams
 from jrcjax.types import Bool, Float, Int, Key
 
 
-class FiveTupleEnv(JRCEnv):
-    """`JRCEnv` whose `step` returns (obs, state, reward, done, info), as gymnax did before version 1.0.
+class FiveTupleEnv(GymnaxEnv):
+    """`GymnaxEnv` whose `step` returns (obs, state, reward, done, info), as gymnax did before version 1.0.
 
     `done` is true after the last slot of an episode, whether it terminated or was cut off; `info` tells which.
     """
