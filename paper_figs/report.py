@@ -16,9 +16,8 @@ import xarray as xr
 
 from jrcjax.params import EnvParams
 from jrcjax.presets import ENVIRONMENTS, paper_params
-from paper_figs import style
+from jrcjax.types import READINGS
 from paper_figs.claims import Judgement
-from sweeps.parameters import READINGS
 from sweeps.sweep import Size
 
 _TEMPLATE = Path(__file__).with_name("report.html.jinja")
@@ -72,7 +71,6 @@ def render(
         claims=[(claim, _figure_of(claim, figures)) for claim in claims],
         counts={verdict: sum(claim.verdict == verdict for claim in claims) for verdict in VERDICTS},
         signs=VERDICTS,
-        algorithms={name: look.label for name, look in style.LOOKS.items()},
         environments=_environments(size.preset),
         optima=optima,
         diverged=diverged,

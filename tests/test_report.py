@@ -134,7 +134,7 @@ def test_settings_and_origin_are_there(page, parsed):
     assert "miss_bank" not in text
     assert "learning_rate|0.001|" in text
     assert "priority_exponent|0.4 (fig5a, fig5b, fig6, fig7, fig8); 0.4, 0.0 (fig9)|" in text
-    assert re.search(r"fig6\|\s*\|?DPR\|3\|41\|", text.replace("\n", ""))
+    assert re.search(r"fig6\|\s*\|?dpr\|3\|41\|", text.replace("\n", ""))
     manifest = json.loads((REFERENCE / "fig6.manifest.json").read_text())
     assert manifest["git_commit"][:12] in page
     assert f"jax {manifest['versions']['jax']}" in page
