@@ -30,6 +30,15 @@ COUNTING_RULES = ("resolved", "clusters")
 COUNT_MODELS = ("fixed", "poisson")
 PLACEMENTS = ("bank", "fresh")
 INITIAL_WEIGHTS = ("random", "source")
+READINGS = {
+    "event_model": EVENT_MODELS,
+    "miss_convention": MISS_CONVENTIONS,
+    "distance": DISTANCES,
+    "counting_rule": COUNTING_RULES,
+    "count_model": COUNT_MODELS,
+    "initial_weights": INITIAL_WEIGHTS,
+}
+"""Field of the parameters to the names of its readings."""
 
 
 def choice(field: str, name: str, allowed: tuple[str, ...]) -> int:

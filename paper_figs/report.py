@@ -3,23 +3,40 @@
 from __future__ import annotations
 
 import base64
+import json
+import shlex
+import struct
 from pathlib import Path
 from typing import Any
 
+import jax
 import jinja2
+import numpy as np
 import xarray as xr
 
+from jrcjax.params import EnvParams
+from jrcjax.presets import ENVIRONMENTS, paper_params
+from jrcjax.types import READINGS
 from paper_figs.claims import Judgement
 from sweeps.sweep import Size
 
 _TEMPLATE = Path(__file__).with_name("report.html.jinja")
+_OPTIMUM = ("reward", "throughput", "miss_detection")
+VERDICTS = {"supported": "✓", "contradicted": "✗", "undecided": "?"}
+"""Signs of the verdicts, which are told apart without their colours."""
 
 
 def optimum_rows(sweep: str, data: xr.Dataset) -> list[dict[str, Any]]:
-    """One row per point with the exact optimum's figures."""
-    names = ("reward", "throughput", "miss_detection")
+    """One row per point with the exact optimum's figures, and what varies where there are several points."""
+    varied = [str(name) for name, values in data.coords.items() if values.dims == ("point",) and name != "point"]
+    varied = varied if data.sizes["point"] > 1 else []
     return [
-        {"sweep": sweep, "point": int(point)} | {n: float(data[f"optimum_{n}"].sel(point=point)) for n in names}
+        {
+            "sweep": sweep,
+            "point": int(point),
+            "x": {name: float(data[name].sel(point=point)) for name in varied},
+            **{name: float(data[f"optimum_{name}"].sel(point=point)) for name in _OPTIMUM},
+        }
         for point in data["point"].values
     ]
 
@@ -36,17 +53,112 @@ def render(
 
     Args:
       size: what was run.
-      pictures: title to PNG file.
+      pictures: title to PNG file, whose name without suffix is that of the figure's sweep.
       claims: verdicts.
       optima: rows of `optimum_rows`.
       diverged: rows of `divergence.rows`.
       manifests: sweep name to its manifest's text.
     """
-    embedded = [
-        {"title": title, "png": base64.b64encode(path.read_bytes()).decode()} for title, path in pictures.items()
-    ]
-    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
-    template = environment.from_string(_TEMPLATE.read_text())
-    return template.render(
-        size=size, pictures=embedded, claims=claims, optima=optima, diverged=diverged, manifests=manifests
+    figures = [_picture(title, path) for title, path in pictures.items()]
+    parsed = {name: json.loads(text) for name, text in manifests.items()}
+    environment = jinja2.Environment(
+        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
+    environment.filters["number"] = _number
+    return environment.from_string(_TEMPLATE.read_text()).render(
+        size=size,
+        figures=figures,
+        claims=[(claim, _figure_of(claim, figures)) for claim in claims],
+        counts={verdict: sum(claim.verdict == verdict for claim in claims) for verdict in VERDICTS},
+        signs=VERDICTS,
+        environments=_environments(size.preset),
+        optima=optima,
+        diverged=diverged,
+        command=_command(size),
+        settings=_settings(parsed),
+        made=_made(parsed),
+        manifests=manifests,
+    )
+
+
+def _picture(title: str, path: Path) -> dict[str, Any]:
+    png = path.read_bytes()
+    width, height = struct.unpack(">II", png[16:24])  # the first fields of the first chunk
+    narrow = width < 1.5 * height
+    content = base64.b64encode(png).decode()
+    return {"name": path.stem, "title": title, "png": content, "width": width, "height": height, "is_column": narrow}
+
+
+def _number(value: float) -> str:
+    """A number for a table, with four digits; a dash where there is none."""
+    return "–" if value != value else f"{value:#.4g}".rstrip(".").replace("-", "−")
+
+
+def _figure_of(claim: Judgement, figures: list[dict[str, Any]]) -> str | None:
+    """The name of the picture that a claim rests on: "6a" is a panel of fig6, "5a" is fig5a."""
+    names = [figure["name"] for figure in figures]
+    return next((name for name in (f"fig{claim.figure}", f"fig{claim.figure}".rstrip("abc")) if name in names), None)
+
+
+def _command(size: Size) -> str:
+    """What makes the same figures and the same page."""
+    options = ["--seeds", str(size.seeds), "--episodes", str(size.episodes), "--preset", size.preset]
+    smoke = [] if size.pretraining == Size.pretraining else ["--smoke"]
+    return f"make figures ARGS={shlex.quote(shlex.join([*smoke, *options]))}"
+
+
+def _environments(preset: str) -> dict[str, list[str]]:
+    """Every number of source and target by its path, without the bank, which follows from the others."""
+    both = [_numbers(paper_params(name, preset)) for name in ENVIRONMENTS]
+    return {path: [numbers[path] for numbers in both] for path in both[0]}
+
+
+def _numbers(params: EnvParams) -> dict[str, str]:
+    leaves = jax.tree_util.tree_leaves_with_path(params)
+    named = {jax.tree_util.keystr(path, simple=True, separator="."): np.asarray(leaf) for path, leaf in leaves}
+    found = {}
+    for path, values in named.items():
+        readings = READINGS.get(path.split(".")[-1])
+        if "bank_inputs" in path or "miss_bank" in path:
+            continue
+        found[path] = readings[int(values)] if readings else _listed(values)
+    return found | {"max_steps_in_episode": str(params.max_steps_in_episode)}
+
+
+def _listed(values: np.ndarray) -> str:
+    if values.ndim < 2:
+        return ", ".join(f"{value:.6g}" for value in np.atleast_1d(values))
+    return "; ".join(map(_listed, values))
+
+
+def _settings(manifests: dict[str, dict]) -> dict[str, dict[str, dict[str, list[str]]]]:
+    """Section to field to value to the sweeps with that value; a value that all sweeps share has all of their names."""
+    found: dict[str, dict[str, dict[str, list[str]]]] = {"hparams": {}, "config": {}}
+    for name, manifest in manifests.items():
+        for section, fields in found.items():
+            for field, value in manifest["configuration"].get(section, {}).items():
+                shown = ", ".join(map(str, value)) if isinstance(value, list) else str(value)
+                fields.setdefault(field, {}).setdefault(shown, []).append(name)
+    return found
+
+
+def _made(manifests: dict[str, dict]) -> list[dict[str, Any]]:
+    """Where each sweep's results come from."""
+    return [
+        {
+            "sweep": name,
+            "seeds": len(m["seeds"]),
+            "finished": m["finished"],
+            "command": m["command"],
+            "commit": (m["git_commit"] or "not in git")[:12] + (" with changes" if m["git_modified"] else ""),
+            "machine": ", ".join(_in_words(key, value) for key, value in m["machine"].items()),
+            "versions": ", ".join(f"{package} {version}" for package, version in m["versions"].items()),
+        }
+        for name, m in manifests.items()
+    ]
+
+
+def _in_words(key: str, value: Any) -> str:
+    if key == "cores":
+        return f"{value} cores"
+    return " ".join(value) if isinstance(value, list) else str(value)

@@ -25,16 +25,21 @@ class Look(NamedTuple):
     label: str
     color: str
     marker: str = ""
-    line: str = "-"
+    line: str | tuple[int, tuple[float, ...]] = "-"
+    size: float | None = None
+    """Of the marker in points; the style's if None."""
+    hollow: bool = False
+    """Whether the marker shows what is drawn on it."""
 
 
-# Okabe and Ito's palette, which stays apart for the colour-blind and in grey.
+# Okabe and Ito's palette, which stays apart for the colour-blind; markers and line styles do in grey. DDQN, which often
+# lies on DPR, is a dashed line on a solid one, with small markers in hollow ones.
 LOOKS = {
     "tlwd": Look("TLwD", "#D55E00", "o"),
-    "tlwd_uniform": Look("TLwD, uniform", "#000000", "x"),
-    "dpr": Look("DPR", "#009E73", "s"),
-    "ddqn": Look("DDQN", "#0072B2", "^"),
-    "q_learning": Look("Q-learning", "#CC79A7", "D"),
+    "tlwd_uniform": Look("TLwD, uniform", "#000000", "x", (0, (2.5, 1.0))),
+    "dpr": Look("DPR", "#009E73", "s", size=5.0, hollow=True),
+    "ddqn": Look("DDQN", "#0072B2", "^", (0, (4.0, 1.5)), size=3.0),
+    "q_learning": Look("Q-learning", "#CC79A7", "D", (0, (6.0, 1.0, 1.0, 1.0))),
     "round_robin": Look("Round Robin", "#56B4E9", "v"),
 }
 EXACT = {
@@ -46,15 +51,18 @@ EXACT = {
 
 
 def plot(axes: Axes, curve: pd.DataFrame, look: Look, markers: int) -> None:
-    """One line of a table with its band and about so many markers."""
+    """One line of a table with its band and about so many markers, where there is room beside those of other lines."""
     every = max(len(curve) // markers, 1)
+    place = [*LOOKS.values()].index(look) if look in LOOKS.values() else 0
     axes.plot(
         curve.x,
         curve["mean"],
         color=look.color,
         linestyle=look.line,
         marker=look.marker,
-        markevery=every,
+        markersize=look.size,
+        markerfacecolor="white" if look.hollow else look.color,
+        markevery=(place * every // len(LOOKS), every),
         label=look.label,
     )
     if curve.n_seeds.max() > 0:

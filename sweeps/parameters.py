@@ -16,18 +16,9 @@ import numpy as np
 
 from jrcjax.checks import refuse
 from jrcjax.params import FACTORS
-from jrcjax.types import COUNT_MODELS, COUNTING_RULES, DISTANCES, EVENT_MODELS, INITIAL_WEIGHTS, MISS_CONVENTIONS
+from jrcjax.types import READINGS
 from sweeps.program import Points
 
-READINGS = {
-    "event_model": EVENT_MODELS,
-    "miss_convention": MISS_CONVENTIONS,
-    "distance": DISTANCES,
-    "counting_rule": COUNTING_RULES,
-    "count_model": COUNT_MODELS,
-    "initial_weights": INITIAL_WEIGHTS,
-}
-"""Field to the names of the readings that it is an index of."""
 _ROOTS = {"env": "params", "hparams": "hparams"}
 _DERIVED = ("miss_bank", "bank_inputs")  # follow from a radar's other fields
 _DISTRIBUTIONS = ("prior", "class_share")

@@ -1,5 +1,6 @@
 """Figures: the numbers first, then the files; drawing is a function of results and never trains."""
 
+import itertools
 import json
 import subprocess
 import sys
@@ -8,6 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from matplotlib.colors import to_rgb
+from matplotlib.text import Text
 from scipy import stats
 
 from jrcjax import Log
@@ -444,3 +447,60 @@ def test_diverged_agents_are_counted_at_each_point():
     data["first_diverged"].loc[{"algorithm": "tlwd", "point": 1, "seed": 0}] = 1
     table = points.table(data.assign_coords(point=[0, 1]), "8", "density")
     assert table.query("n_diverged > 0")[["algorithm", "x"]].drop_duplicates().values.tolist() == [["tlwd", 16.0]]
+
+
+# --- Legibility -------------------------------------------------------------------------------------------------------
+
+# Linear RGB as it appears without the medium-wave cones: Machado, Oliveira and Fernandes (2009), severity 1.
+DEUTERANOPIA = np.array(
+    [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.01182, 0.04294, 0.968881]]
+)
+LUMINANCE = np.tile([0.2126, 0.7152, 0.0722], (3, 1))
+
+
+def lab(color, seen_through):
+    """CIE L*a*b* (D65) of a colour after a linear map of its RGB."""
+    rgb = np.array(to_rgb(color))
+    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+    to_xyz = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
+    xyz = to_xyz @ np.clip(seen_through @ linear, 0, 1) / to_xyz.sum(axis=1)
+    f = np.where(xyz > 0.008856, np.cbrt(xyz), 7.787 * xyz + 16 / 116)
+    return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
+
+
+def distance(a, b, seen_through):
+    return np.linalg.norm(lab(a.color, seen_through) - lab(b.color, seen_through))
+
+
+PAIRS = list(itertools.combinations(style.LOOKS.values(), 2))
+
+
+def test_the_colours_of_algorithms_stay_apart_for_the_colour_blind():
+    # 10 is a difference that nobody overlooks; a red and a green show that the measure tells what others see.
+    assert min(distance(a, b, DEUTERANOPIA) for a, b in PAIRS) > 10
+    red, green = style.Look("", "#B5651D"), style.Look("", "#7D7D1D")
+    assert distance(red, green, DEUTERANOPIA) < 10 < distance(red, green, np.eye(3))
+
+
+def test_in_grey_every_algorithm_has_its_marker_and_those_as_dark_another_line():
+    assert len({look.marker for look in style.LOOKS.values()}) == len(style.LOOKS)
+    alike = [(a, b) for a, b in PAIRS if distance(a, b, LUMINANCE) < 4]
+    assert all(a.line != b.line or a.hollow != b.hollow for a, b in alike)
+    exact = [look.line for look in style.EXACT.values()]
+    assert len(set(exact)) == len(exact)
+    assert all(look.marker == "" for look in style.EXACT.values())
+
+
+def test_markers_of_curves_are_beside_each_other():
+    axes = curves.draw(curves.table(results(), "5", "a"), "title").axes[0]
+    first = [line.get_markevery()[0] for line in axes.get_lines() if line.get_marker()]
+    assert len(set(first)) == len(first) == 3
+
+
+def test_one_column_is_as_wide_as_a_papers_and_no_text_is_smaller_than_six_points():
+    for figure, width in (
+        (curves.draw(curves.table(results(), "5", "a"), "title"), 3.5),
+        (points.draw(points.table(speed_world(true=True), "6", "high_speed_event_probability"), "title", "x"), 7.16),
+    ):
+        assert figure.get_figwidth() == width
+        assert min(text.get_fontsize() for text in figure.findobj(Text)) >= 6
