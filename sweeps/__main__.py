@@ -10,6 +10,7 @@ from typing import Annotated
 import tyro
 from rich.console import Console
 
+from sweeps import interrupts
 from sweeps.sweep import size_of
 
 
@@ -76,7 +77,11 @@ def main(args: list[str] | None = None) -> int:
             return _verify(command)
         choice("name", command.name, tuple(SWEEPS))
         size = size_of(command.seeds, command.episodes, command.preset, command.smoke)
-        folder = run_sweep(SWEEPS[command.name], size, command.out, console, resume=command.resume)
+        with interrupts.terminable():
+            folder = run_sweep(SWEEPS[command.name], size, command.out, console, resume=command.resume)
+    except KeyboardInterrupt:
+        print(interrupts.how_to_go_on("--resume"), file=sys.stderr)
+        return interrupts.STATUS
     except (ValueError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 ENVIRONMENT = {"slot", "environment", "exact", "divergence"}
 # What puts the parts together; modules of the package that are in none of these sets hold equations.
-TRAINING = {"__init__", "training", "parallel", "episodes", "source", "transfer", "adapters"}
+TRAINING = {"__init__", "training", "memory", "parallel", "episodes", "source", "transfer", "adapters"}
 LEVELS = ("equations", "environment", "learners", "training", "sweeps", "paper_figs")
 
 
