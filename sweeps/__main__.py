@@ -11,6 +11,7 @@ import tyro
 from rich.console import Console
 
 from jrcjax.checks import refuse
+from sweeps import interrupts
 from sweeps.custom import CUSTOM, Custom, Options, custom_sweep
 from sweeps.sweep import Study, size_of
 
@@ -89,11 +90,15 @@ def main(args: list[str] | None = None) -> int:
         size.check()
         sweeps = study.smoke_sweeps if command.smoke and study.smoke_sweeps else study.sweeps
         options = {"resume": command.resume, "save_agents": command.save_agents}
-        written = [run_sweep(sweep, size, command.out, console, **options) for sweep in sweeps]
-        if own:
-            written += custom.write(written[0], own, size.seeds)
-        if study.name in SUMMARIES:
-            written += SUMMARIES[study.name](sweeps, size, command.out)
+        with interrupts.terminable():
+            written = [run_sweep(sweep, size, command.out, console, **options) for sweep in sweeps]
+            if own:
+                written += custom.write(written[0], own, size.seeds)
+            if study.name in SUMMARIES:
+                written += SUMMARIES[study.name](sweeps, size, command.out)
+    except KeyboardInterrupt:
+        print(interrupts.how_to_go_on("--resume"), file=sys.stderr)
+        return interrupts.STATUS
     except (ValueError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
