@@ -20,6 +20,8 @@ from jrcjax.params import EnvParams
 from jrcjax.replay import Transition
 from jrcjax.types import Float, Int, Key, Words
 
+ENUMERABLE = 2**20
+"""States up to which a policy is evaluated exactly after each episode, which takes some 200 MB per agent there."""
 _INIT, _EPISODES = 0, 1  # purposes of an agent's key
 
 
@@ -32,7 +34,10 @@ class AgentState(NamedTuple):
 
 
 class Log(NamedTuple):
-    """Per episode, [episodes]; the last three are exact and belong to the policy without exploration."""
+    """Per episode, [episodes]; the last three are exact and belong to the policy without exploration.
+
+    They are NaN where there are more than ENUMERABLE states.
+    """
 
     reward: Float
     """Mean reward per slot."""
@@ -114,7 +119,9 @@ def run_episode(
     (_, learner_state, sums), _ = jax.lax.scan(
         one_slot, start, (of_slots, learner.draw(of_updates, numbers), numbers, jnp.arange(slots))
     )
-    exact = evaluate_policy(env_params, learner.policy(learner_state))
+    exact = (jnp.float32(jnp.nan),) * 3
+    if env_params.num_states <= ENUMERABLE:
+        exact = evaluate_policy(env_params, learner.policy(learner_state))
     log = Log(metrics.average_reward(sums), metrics.throughput(sums), metrics.miss_detection(sums), *exact)
     return AgentState(agent.key, learner_state), log
 
