@@ -22,6 +22,8 @@ from jrcjax.params import EnvParams, check_params
 from jrcjax.replay import Transition
 from jrcjax.types import Bool, Float, Int, Key, Words
 
+ENUMERABLE = 2**20
+"""States up to which a policy is evaluated exactly after each episode, which takes some 200 MB per agent there."""
 _INIT, _EPISODES = 0, 1  # purposes of an agent's key
 
 
@@ -34,7 +36,10 @@ class AgentState(NamedTuple):
 
 
 class Log(NamedTuple):
-    """Per episode, [episodes]; policy figures are exact and belong to the policy without exploration."""
+    """Per episode, [episodes]; policy figures are exact and belong to the policy without exploration.
+
+    With more than ENUMERABLE states policy figures are NaN, and divergence is not looked for.
+    """
 
     reward: Float
     """Mean reward per slot."""
@@ -136,10 +141,11 @@ def run_episode(
         one_slot, start, (of_slots, learner.draw(of_updates, numbers), numbers, jnp.arange(slots))
     )
     simulated = (metrics.average_reward(sums), metrics.throughput(sums), metrics.miss_detection(sums))
-    exact = evaluate_policy(env_params, learner.policy(learner_state))
-    diverged = jnp.bool_(False)
-    if learner.values is not None:
-        diverged = has_diverged(learner.values(learner_state), env_params, hparams.discount)
+    exact, diverged = (jnp.float32(jnp.nan),) * 3, jnp.bool_(False)
+    if env_params.num_states <= ENUMERABLE:
+        exact = evaluate_policy(env_params, learner.policy(learner_state))
+        if learner.values is not None:
+            diverged = has_diverged(learner.values(learner_state), env_params, hparams.discount)
     log = Log(*simulated, *exact, diverged)
     return AgentState(agent.key, learner_state), log
 

@@ -98,7 +98,7 @@ class Config:
     samples of the mini-batch; "auto" takes the table up to 256 states. Both give the same gradient."""
 
     def uses_table(self, num_states: int) -> bool:
-        """Whether the loss is computed on the table of all states."""
+        """Whether the loss is computed on the table of all states, not on the rows of a mini-batch; see `form`."""
         return self.form == "table" or (self.form == "auto" and num_states <= _MAX_TABLE_STATES)
 
 

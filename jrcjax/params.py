@@ -143,6 +143,8 @@ def check_all_but_radar(params: EnvParams) -> None:
     check_channel(params.channel)
     for name in FACTORS[1:]:
         check_factor(name, getattr(params, name))
+    if params.num_states >= 2**31:
+        refuse("shape", f"{params.shape}, {params.num_states} states", "fewer than 2^31 states, whose ids are int32")
     weights = "four weights >= 0 (rho_1 to rho_4), of a signed type"
     require("reward_weights", params.reward_weights, (4,), is_not_negative, weights, kinds="if")
     require_reading("event_model", params.event_model, EVENT_MODELS)

@@ -10,6 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from tiny import tiny_params
 
 import jrcjax
 from jrcjax.adapters import FiveTupleEnv
@@ -123,11 +124,11 @@ def test_registered_episode_ends_at_the_time_limit():
 
 
 def test_gymnasium_renders_the_slot_that_it_ran():
-    env = gymnasium_env(params=PARAMS.replace(max_steps_in_episode=9), render_mode="rgb_array")
+    env = gymnasium_env(params=tiny_params(), render_mode="rgb_array")
     env.reset(seed=1)
     first = env.render()
     pictures = []
-    for action in (0, 3):
+    for action in (0, 4):
         env.step(action)
         pictures.append(env.render())
     assert all(p.dtype == np.uint8 and p.shape == first.shape for p in pictures)
@@ -177,19 +178,6 @@ def test_gymnasium_rewards_have_the_exact_mean():
             env.reset()
     batches = np.reshape(rewards, (30, 300)).mean(axis=1)
     assert abs(batches.mean() - wanted) < 4 * batches.std(ddof=1) / np.sqrt(30)
-
-
-def test_stable_baselines3_trains():
-    pytest.importorskip("stable_baselines3", reason="needs the extra 'clients'")
-    from stable_baselines3 import DQN
-
-    env = registered("target")
-    model = DQN("MlpPolicy", env, learning_starts=32, buffer_size=500, policy_kwargs={"net_arch": [8]}, seed=0)
-    before = [p.detach().clone() for p in model.q_net.parameters()]
-    model.learn(400, progress_bar=False)
-    assert any(not (a == b).all() for a, b in zip(before, model.q_net.parameters(), strict=True))
-    assert len(model.ep_info_buffer) == 1  # one whole episode
-    assert model.ep_info_buffer[0]["l"] == 300
 
 
 class Wrapper:
