@@ -15,7 +15,7 @@ import jax.numpy as jnp
 from jrcjax import exploration, metrics, rng, slot
 from jrcjax.checks import refuse
 from jrcjax.divergence import has_diverged
-from jrcjax.exact import evaluate_policy
+from jrcjax.exact import LongRun, evaluate_policy
 from jrcjax.hparams import Config, HParams, check_config, check_hparams
 from jrcjax.learners import Learner, LearnerFactory, Source, Spec, make_learner
 from jrcjax.params import EnvParams, check_params
@@ -141,7 +141,7 @@ def run_episode(
         one_slot, start, (of_slots, learner.draw(of_updates, numbers), numbers, jnp.arange(slots))
     )
     simulated = (metrics.average_reward(sums), metrics.throughput(sums), metrics.miss_detection(sums))
-    exact, diverged = (jnp.float32(jnp.nan),) * 3, jnp.bool_(False)
+    exact, diverged = LongRun(*(jnp.float32(jnp.nan),) * 3), jnp.bool_(False)
     if env_params.num_states <= ENUMERABLE:
         exact = evaluate_policy(env_params, learner.policy(learner_state))
         if learner.values is not None:

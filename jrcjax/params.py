@@ -16,6 +16,7 @@ from jrcjax.checks import (
     as_array,
     is_not_negative,
     is_probability,
+    refuse,
     replaced,
     require,
     require_integer,
