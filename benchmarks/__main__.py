@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import importlib
 import json
+import os
 import sys
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Annotated
 
 import tyro
@@ -38,7 +40,7 @@ def main(args: list[str] | None = None) -> int:
     if unknown:
         print(f"error: names: {unknown[0]!r} is unknown; allowed: {', '.join(NAMES)}", file=sys.stderr)
         return 2
-    if options.json is not None and not options.json.parent.is_dir():
+    if options.json is not None and not _is_writable(options.json):
         print(f"error: json: {str(options.json)!r}; allowed: a file in an existing folder", file=sys.stderr)
         return 2
     results = []
@@ -50,6 +52,10 @@ def main(args: list[str] | None = None) -> int:
         content = {"machine": machine() | {"versions": versions()}, "results": [asdict(result) for result in results]}
         options.json.write_text(json.dumps(content, indent=2) + "\n")
     return 0
+
+
+def _is_writable(file: Path) -> bool:
+    return not file.is_dir() and file.parent.is_dir() and os.access(file if file.exists() else file.parent, os.W_OK)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
-from jrcjax.checks import is_ascending, is_distribution, is_not_negative, is_positive, require, require_type
+from jrcjax.checks import is_ascending, is_distribution, is_not_negative, is_positive, replaced, require, require_type
 from jrcjax.types import Float, Int
 
 
@@ -28,6 +28,10 @@ class Channel:
     """[L] smallest SINR (a ratio, not dB) at which each rate decodes, ascending."""
     packets: Float
     """[L] packets per slot that each rate carries when it decodes."""
+
+
+# After the class, because flax's decorator sets a `replace` of its own.
+Channel.replace = replaced  # pyright: ignore[reportAttributeAccessIssue]
 
 
 def sinr(channel: Channel) -> Float:

@@ -6,9 +6,12 @@ known, that is outside `jit` and `vmap`.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from typing import Any, NoReturn
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
@@ -56,6 +59,33 @@ def require_type(field: str, value: Any, wanted: type) -> None:
     """Refuses an object of another type."""
     if not isinstance(value, wanted):
         raise ValueError(f"{field}: {type(value).__name__}; allowed: {wanted.__name__}")
+
+
+def require_integer(field: str, value: Any, least: int, most: int = 2**31 - 1) -> None:
+    """Refuses what is not a Python integer in a range; NumPy's are none, since they would not compare as settings."""
+    if type(value) is not int or not least <= value <= most:
+        refuse(field, value if type(value) in (int, float) else repr(value), f"a Python int from {least} to {most}")
+
+
+def require_keys(keys: Any, dimensions: int, allowed: str) -> None:
+    """Refuses what is not an array of PRNG keys with so many dimensions."""
+    if not isinstance(keys, jax.Array):
+        refuse("key", f"object of type {type(keys).__name__}", allowed)
+    typed = jnp.issubdtype(keys.dtype, jax.dtypes.prng_key)
+    if not typed and (keys.dtype != jnp.uint32 or keys.shape[-1:] != (2,)):
+        refuse("key", f"array of {keys.dtype}, shape {keys.shape}", allowed)
+    shape = keys.shape if typed else keys.shape[:-1]  # an old-style key is an array of two words
+    if len(shape) != dimensions or 0 in shape:
+        refuse("key", f"shape {keys.shape}", allowed)
+
+
+def replaced(self: Any, **changes: Any) -> Any:
+    """A copy of a dataclass with the given fields changed; unknown ones are refused."""
+    known = [field.name for field in dataclasses.fields(self)]
+    for name in changes:
+        if name not in known:
+            refuse(f"{type(self).__name__}.replace", name, f"the fields {', '.join(known)}")
+    return dataclasses.replace(self, **changes)
 
 
 def as_array(field: str, value: Any, allowed: str) -> np.ndarray:

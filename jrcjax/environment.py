@@ -9,11 +9,13 @@ import jax.numpy as jnp
 from flax import struct
 
 from jrcjax import slot, states
-from jrcjax.checks import require
-from jrcjax.params import EnvParams
+from jrcjax.checks import require, require_keys, require_type
+from jrcjax.params import EnvParams, check_params
 from jrcjax.presets import paper_params
 from jrcjax.spaces import Box, Discrete
 from jrcjax.types import Bool, Float, Int, Key
+
+_ONE_KEY = "one key, as jax.random.key returns it; use vmap for several"
 
 
 @struct.dataclass
@@ -33,7 +35,15 @@ class JRCEnv:
 
     def __init__(self, default_params: EnvParams | None = None):
         """Args: default_params: used where a method gets none; the paper's target environment if None."""
+        if default_params is not None:
+            check_params(default_params)
         self._default_params = default_params
+
+    def _given(self, params: EnvParams | None) -> EnvParams:
+        """The parameters, or the default ones if there are none."""
+        params = self.default_params if params is None else params
+        require_type("params", params, EnvParams)
+        return params
 
     @property
     def name(self) -> str:
@@ -59,32 +69,33 @@ class JRCEnv:
 
     def action_space(self, params: EnvParams | None = None) -> Discrete:
         """Data rates, then radar modes."""
-        return Discrete((params or self.default_params).num_actions)
+        return Discrete(self._given(params).num_actions)
 
     def observation_space(self, params: EnvParams | None = None) -> Box:
         """Scaled factor levels."""
-        return Box(0.0, 1.0, (len((params or self.default_params).shape),))
+        return Box(0.0, 1.0, (len(self._given(params).shape),))
 
     def get_obs(self, state: EnvState, params: EnvParams | None = None) -> Float:
         """Observation of a state, [5]."""
-        return states.features_of(state.id, (params or self.default_params).shape)
+        return states.features_of(state.id, self._given(params).shape)
 
     def reset_env(self, key: Key, params: EnvParams) -> tuple[Float, EnvState]:
         """Observation and state at the start of an episode."""
+        require_type("params", params, EnvParams)
+        require_keys(key, 0, _ONE_KEY)
         words = jax.random.bits(key, (slot.NUM_WORDS,), jnp.uint32)
         state = EnvState(slot.initial_state(words, params), jnp.int32(0))
         return self.get_obs(state, params), state
 
     def reset(self, key: Key, params: EnvParams | None = None) -> tuple[Float, EnvState]:
         """Observation and state at the start of an episode."""
-        return self.reset_env(key, params or self.default_params)
+        return self.reset_env(key, self._given(params))
 
     def step_env(
         self, key: Key, state: EnvState, action: Int | int, params: EnvParams
     ) -> tuple[Float, EnvState, Float, Bool, dict[str, Any]]:
         """One slot without reset: (obs, state, reward, terminated, info)."""
-        in_range = lambda a: (a >= 0) & (a < params.num_actions)  # noqa: E731
-        require("action", action, (), in_range, f"an integer from 0 to {params.num_actions - 1}", kinds="iu")
+        _check_step(key, state, action, params)
         words = jax.random.bits(key, (slot.NUM_WORDS,), jnp.uint32)
         outcome = slot.run_slot(words, state.id, jnp.asarray(action, jnp.int32), params)
         new = EnvState(outcome.next_state, state.time + 1)
@@ -106,7 +117,8 @@ class JRCEnv:
           those of the next episode, and `info["final_observation"]` is the one that the slot led to. `info` also holds
           `event`, `packets` (delivered) and `miss_ratio` (1 in a slot spent on data).
         """
-        params = params or self.default_params
+        params = self._given(params)
+        _check_step(key, state, action, params)
         step_key, reset_key = jax.random.split(key)
         obs, new, reward, terminated, info = self.step_env(step_key, state, action, params)
         truncated = self.is_truncated(new, params)
@@ -115,3 +127,11 @@ class JRCEnv:
         info = {**info, "final_observation": obs, "terminated": terminated, "truncated": truncated}
         obs, new = jax.tree.map(lambda a, b: jnp.where(done, a, b), (first_obs, first), (obs, new))
         return obs, new, reward, terminated, truncated, info
+
+
+def _check_step(key: Key, state: EnvState, action: Int | int, params: EnvParams) -> None:
+    require_type("params", params, EnvParams)
+    require_type("state", state, EnvState)
+    require_keys(key, 0, _ONE_KEY)
+    in_range = lambda a: (a >= 0) & (a < params.num_actions)  # noqa: E731
+    require("action", action, (), in_range, f"an integer from 0 to {params.num_actions - 1}", kinds="iu")

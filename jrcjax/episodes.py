@@ -13,11 +13,12 @@ import jax
 import jax.numpy as jnp
 
 from jrcjax import exploration, metrics, rng, slot
+from jrcjax.checks import refuse
 from jrcjax.divergence import has_diverged
 from jrcjax.exact import evaluate_policy
-from jrcjax.hparams import Config, HParams
+from jrcjax.hparams import Config, HParams, check_config, check_hparams
 from jrcjax.learners import Learner, LearnerFactory, Source, Spec, make_learner
-from jrcjax.params import EnvParams
+from jrcjax.params import EnvParams, check_params
 from jrcjax.replay import Transition
 from jrcjax.types import Bool, Float, Int, Key, Words
 
@@ -49,6 +50,23 @@ class Log(NamedTuple):
     """Its miss detection."""
     diverged: Bool
     """Whether the learner's values have diverged at the episode's end, see `jrcjax.divergence`."""
+
+
+def check_training(env_params: EnvParams, hparams: HParams, config: Config) -> None:
+    """Checks all that an agent is trained with.
+
+    Raises:
+      ValueError: naming the field, the value and what is allowed.
+    """
+    check_params(env_params)
+    check_hparams(hparams)
+    check_config(config)
+    most = (2**31 - 1) // env_params.max_steps_in_episode
+    if config.episodes > most:
+        allowed = (
+            f"at most {most}, since slots of {env_params.max_steps_in_episode} per episode are numbered in 32 bits"
+        )
+        refuse("config.episodes", config.episodes, allowed)
 
 
 def spec_of(env_params: EnvParams) -> Spec:

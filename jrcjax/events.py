@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 
 from jrcjax import states
-from jrcjax.params import EnvParams
+from jrcjax.params import EnvParams, of_params
 from jrcjax.types import Float, Int
 
 
@@ -34,6 +34,7 @@ def event_probability_at(levels: Int, params: EnvParams) -> Float:
     return readings[params.event_model]
 
 
+@of_params
 def event_probability(params: EnvParams) -> Float:
     """p_u in every state, [S]."""
     levels = states.levels_of(jnp.arange(params.num_states), params.shape)

@@ -13,9 +13,9 @@ import numpy as np
 
 from jrcjax import metrics, states
 from jrcjax.channel import delivered_packets
-from jrcjax.checks import require
+from jrcjax.checks import is_positive, require
 from jrcjax.events import event_probability
-from jrcjax.params import EnvParams
+from jrcjax.params import EnvParams, of_params
 from jrcjax.radar import mean_miss_ratio
 from jrcjax.rewards import reward
 from jrcjax.types import Float, Int
@@ -55,6 +55,7 @@ def level_transition(prior: Float, persistence: Float) -> Float:
     return persistence * jnp.eye(prior.shape[0]) + (1.0 - persistence) * prior[None, :]
 
 
+@of_params
 def state_transition(params: EnvParams) -> Float:
     """P(s' | s), [S, S]. Factors evolve independently, so it is the Kronecker product of theirs."""
     matrix = jnp.ones((1, 1))
@@ -63,12 +64,14 @@ def state_transition(params: EnvParams) -> Float:
     return matrix
 
 
+@of_params
 def transition_tensor(params: EnvParams) -> Float:
     """P(s' | s, a), [S, A, S]; equation (10). Actions have no influence on the state."""
     matrix = state_transition(params)
     return jnp.broadcast_to(matrix[:, None, :], (params.num_states, params.num_actions, params.num_states))
 
 
+@of_params
 def stationary_distribution(params: EnvParams) -> Float:
     """Long-run probability of each state under every policy, [S]: the product of the priors."""
     law = jnp.ones(1)
@@ -77,6 +80,7 @@ def stationary_distribution(params: EnvParams) -> Float:
     return law
 
 
+@of_params
 def packet_table(params: EnvParams) -> Float:
     """Packets delivered in each state by each action, [S, A]; 0 for radar."""
     channel = states.levels_of(jnp.arange(params.num_states), params.shape)[:, 0]
@@ -85,6 +89,7 @@ def packet_table(params: EnvParams) -> Float:
     return jnp.pad(sent, ((0, 0), (0, params.radar.num_modes)))
 
 
+@of_params
 def miss_table(params: EnvParams) -> Float:
     """E[p_k] of each action, [A]; 1 for data."""
     return jnp.concatenate([jnp.ones(params.num_rates), mean_miss_ratio(params.radar)])
@@ -94,6 +99,7 @@ def _is_data(params: EnvParams) -> jax.Array:
     return jnp.arange(params.num_actions) < params.num_rates
 
 
+@of_params
 def expected_reward(params: EnvParams) -> Float:
     """E[rho | s, a], [S, A]; equation (11) averaged over event and placement, in both of which it is linear."""
     p = event_probability(params)[:, None]
@@ -102,6 +108,7 @@ def expected_reward(params: EnvParams) -> Float:
     return p * given[0] + (1.0 - p) * given[1]
 
 
+@of_params
 def largest_reward(params: EnvParams) -> Float:
     """Max |rho_t| over states, actions, events and miss ratios, a scalar; equation (11) is linear in the miss ratio."""
     is_data, packets = _is_data(params)[None], packet_table(params)
@@ -113,6 +120,7 @@ def largest_reward(params: EnvParams) -> Float:
     return jnp.abs(jnp.stack(extremes)).max()
 
 
+@of_params
 def value_iteration(params: EnvParams, gamma: Float | float = 0.99, tolerance: float = 1e-4) -> Float:
     """Q* of the discounted problem, [S, A].
 
@@ -128,6 +136,7 @@ def value_iteration(params: EnvParams, gamma: Float | float = 0.99, tolerance: f
       ValueError: naming the argument, the value and what is allowed.
     """
     require("gamma", gamma, (), lambda x: (x >= 0) & (x < 1), "a discount in [0, 1)")
+    require("tolerance", tolerance, (), is_positive, "a number > 0")
     transition, rewards = transition_tensor(params), expected_reward(params)
     gamma = jnp.asarray(gamma, jnp.float32)
     scale = gamma / (1.0 - gamma)
@@ -159,6 +168,7 @@ def value_iteration(params: EnvParams, gamma: Float | float = 0.99, tolerance: f
     return backup(new) + gamma * (low + high) / 2.0
 
 
+@of_params
 def optimal_policy(params: EnvParams, gamma: Float | float = 0.99) -> Float:
     """The greedy policy of Q*, [S, A] with one 1 per row."""
     return greedy_policy(value_iteration(params, gamma))
@@ -169,6 +179,7 @@ def policy_of_actions(actions: Int, num_actions: int) -> Float:
     return jax.nn.one_hot(actions, num_actions)
 
 
+@of_params
 def best_constant_action(params: EnvParams) -> Float:
     """The policy [S, A] that takes the same action in every state and earns the most in the long run."""
     earned = stationary_distribution(params) @ expected_reward(params)
@@ -179,6 +190,7 @@ def _is_policy(policy: np.ndarray) -> bool:
     return bool((policy >= 0).all() and (np.abs(policy.sum(axis=1) - 1.0) < 1e-4).all())
 
 
+@of_params
 def evaluate_policy(params: EnvParams, policy: Float) -> LongRun:
     """Long-run reward, throughput and miss detection per slot of a stationary policy.
 

@@ -12,7 +12,7 @@ import numpy as np
 import optax
 from flax import struct
 
-from jrcjax.checks import is_not_negative, refuse, require, require_reading, require_type
+from jrcjax.checks import is_not_negative, refuse, replaced, require, require_integer, require_reading, require_type
 from jrcjax.types import INITIAL_WEIGHTS, Float, Int
 
 OPTIMISERS = ("adam", "sgd", "rmsprop")
@@ -67,6 +67,10 @@ class HParams:
     initial_weights: Int = struct.field(default_factory=lambda: jnp.int32(0))
     """TLwD's at the start of pre-training, index into INITIAL_WEIGHTS: random, as in Algorithm 2, or the source
     agent's."""
+
+
+# After the class, because flax's decorator sets a `replace` of its own.
+HParams.replace = replaced  # pyright: ignore[reportAttributeAccessIssue]
 
 
 @dataclass(frozen=True)
@@ -155,19 +159,15 @@ def check_config(config: Config) -> None:
     """
     require_type("config", config, Config)
     for name in ("episodes", "batch_size", "replay_capacity", "demonstrations", "pretraining", "n_step"):
-        value, least = getattr(config, name), 0 if name == "pretraining" else 1
-        if not isinstance(value, int) or isinstance(value, bool) or not least <= value < 2**31:
-            refuse(
-                f"config.{name}",
-                value if isinstance(value, int | float) else str(value),
-                f"an integer from {least} to 2^31 - 1",
-            )
-    if not isinstance(config.hidden, tuple) or not all(isinstance(w, int) and w >= 1 for w in config.hidden):
-        refuse("config.hidden", str(config.hidden), "a tuple of integers >= 1")
-    known = isinstance(config.optimiser, optax.GradientTransformation) or config.optimiser in OPTIMISERS
-    if not known:
+        require_integer(f"config.{name}", getattr(config, name), 0 if name == "pretraining" else 1)
+    if not isinstance(config.hidden, tuple):
+        refuse("config.hidden", repr(config.hidden), "a tuple of Python ints >= 1")
+    for width in config.hidden:
+        require_integer("config.hidden", width, 1)
+    named = isinstance(config.optimiser, str) and config.optimiser in OPTIMISERS
+    if not named and not isinstance(config.optimiser, optax.GradientTransformation):
         refuse(
             "config.optimiser", str(config.optimiser), f"{', '.join(map(repr, OPTIMISERS))}, or an optax transformation"
         )
-    if config.form not in FORMS:
+    if not isinstance(config.form, str) or config.form not in FORMS:
         refuse("config.form", str(config.form), ", ".join(map(repr, FORMS)))

@@ -2,16 +2,31 @@
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
+from typing import ParamSpec, TypeVar
+
 import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
 from jrcjax import states
 from jrcjax.channel import Channel, check_channel, check_dynamics
-from jrcjax.checks import as_array, is_not_negative, is_probability, refuse, require, require_reading, require_type
+from jrcjax.checks import (
+    as_array,
+    is_not_negative,
+    is_probability,
+    replaced,
+    require,
+    require_integer,
+    require_reading,
+    require_type,
+)
 from jrcjax.radar import Radar, check_bank, check_radar
 from jrcjax.types import EVENT_MODELS, MISS_CONVENTIONS, Float, Int
 
+P = ParamSpec("P")
+R = TypeVar("R")
 FACTORS = ("channel", "road", "weather", "speed", "nearby")
 """The factors (c, r, w, v, m) of a state, most significant first."""
 
@@ -82,6 +97,21 @@ class EnvParams:
         return self.num_rates + self.radar.num_modes
 
 
+# After the classes, because flax's decorator sets a `replace` of its own.
+Factor.replace = EnvParams.replace = replaced  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def of_params(function: Callable[P, R]) -> Callable[P, R]:
+    """Refuses a first argument that is not EnvParams."""
+
+    @functools.wraps(function)
+    def checked(*args: P.args, **kwargs: P.kwargs) -> R:
+        require_type("params", args[0] if args else kwargs.get("params"), EnvParams)
+        return function(*args, **kwargs)
+
+    return checked
+
+
 def make_factor(prior, event_probability, persistence: float = 0.0) -> Factor:
     """A `Factor` from plain numbers; `check_params` checks them together with the rest."""
     fields = {"prior": prior, "event_probability": event_probability, "persistence": persistence}
@@ -119,6 +149,4 @@ def check_all_but_radar(params: EnvParams) -> None:
     require_reading("miss_convention", params.miss_convention, MISS_CONVENTIONS)
     require("count_event_packets", params.count_event_packets, (), lambda x: np.isin(x, (0, 1)), "0 or 1", kinds="iu")
     require("terminal_time_limit", params.terminal_time_limit, (), lambda x: np.isin(x, (0, 1)), "0 or 1", kinds="iu")
-    limit = params.max_steps_in_episode
-    if not isinstance(limit, int) or isinstance(limit, bool) or limit < 1:
-        refuse("max_steps_in_episode", str(limit), "an integer >= 1")
+    require_integer("max_steps_in_episode", params.max_steps_in_episode, 1)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -34,7 +35,10 @@ from jrcjax.checks import (
     is_probability,
     is_traced,
     refuse,
+    replaced,
     require,
+    require_integer,
+    require_keys,
     require_reading,
     require_type,
 )
@@ -103,7 +107,7 @@ def _replace(self: Radar, **changes) -> Radar:
     bank_size = self.miss_bank.shape[-1]
     modes = np.shape(changes.get("bandwidth", self.bandwidth))
     unknown = {"miss_bank": np.zeros((*modes, bank_size)), "max_objects": (_UNLIMITED,) * math.prod(modes)}
-    new = dataclasses.replace(self, **{**unknown, **changes})
+    new = replaced(self, **{**unknown, **changes})
     check_radar(new)
     given = {
         name: jnp.asarray(value, getattr(self, name).dtype) for name, value in changes.items() if name != "placements"
@@ -148,9 +152,7 @@ def make_radar(
         "count_model": choice("radar.count_model", count_model, COUNT_MODELS),
     }
     for name, value in (("bank_size", bank_size), ("bank_seed", bank_seed)):
-        least = 1 if name == "bank_size" else 0
-        if type(value) is not int or not least <= value < 2**31:
-            refuse(f"radar.{name}", str(value), f"an integer from {least} to 2^31 - 1")
+        require_integer(f"radar.{name}", value, 1 if name == "bank_size" else 0)
     numbers = {
         "bandwidth": bandwidth,
         "slope": slope,
@@ -162,26 +164,25 @@ def make_radar(
     }
     arrays = {name: as_array(f"radar.{name}", value, "numbers") for name, value in numbers.items()}
     modes = arrays["bandwidth"].shape
-    radar = Radar(
-        **{name: jnp.asarray(array) for name, array in arrays.items()},
-        **{name: jnp.int32(index) for name, index in readings.items()},
-        bank_seed=jnp.int32(bank_seed),
-        miss_bank=jnp.zeros((*modes, bank_size)),
-        bank_inputs=jnp.zeros(0),
-        max_objects=(_UNLIMITED,) * math.prod(modes),
-        placements=placements,
-    )
+    fields: dict[str, Any] = {  # NumPy's arrays, so that checking them compiles nothing
+        **arrays,
+        **{name: np.int32(index) for name, index in readings.items()},
+        "bank_seed": np.int32(bank_seed),
+        "miss_bank": np.zeros((*modes, 1)),
+        "bank_inputs": np.zeros(0),
+    }
+    radar = Radar(**fields, max_objects=(_UNLIMITED,) * math.prod(modes), placements=placements)
     check_radar(radar)
     largest = as_array("radar.max_density", density if max_density is None else max_density, "a number > 0")
     require("radar.max_density", largest, (), is_positive, "a number > 0")
     scale = max(float(largest / arrays["density"]), 1.0)
     radar = dataclasses.replace(radar, max_objects=_capacities(radar, scale=scale))
-    return _with_bank(radar, bank_size)
+    return _with_bank(jax.tree.map(jnp.asarray, radar), bank_size)
 
 
 def _concrete_counts(radar: Radar) -> np.ndarray:
-    with jax.ensure_compile_time_eval():  # also where a trace builds a radar from known numbers
-        return np.asarray(mean_count(radar), np.float64)
+    known = {name: np.asarray(getattr(radar, name)) for name in ("density", "slope", "max_intermediate_frequency")}
+    return np.asarray(mean_count(dataclasses.replace(radar, **known)), np.float64)
 
 
 def _capacities(radar: Radar, at_least: tuple[int, ...] = (), scale: float = 1.0) -> tuple[int, ...]:
@@ -227,6 +228,7 @@ def miss_ratio(
         "counting_rule": choice("rule", rule, COUNTING_RULES),
         "count_model": choice("count", count, COUNT_MODELS),
     }
+    require_keys(key, 0, "one key, as jax.random.key returns it; use vmap for several")
     require("density", density, (), is_positive, "a finite number > 0")
     if radar is None:
         from jrcjax.presets import paper_radar

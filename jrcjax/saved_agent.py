@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jrcjax.checks import refuse
+from jrcjax.checks import refuse, require_keys
 from jrcjax.episodes import AgentState, Log, run_episodes, spec_of
 from jrcjax.exact import LongRun
 from jrcjax.hparams import Config, HParams
@@ -21,7 +21,6 @@ from jrcjax.learners.fixed import FIXED, FixedState
 from jrcjax.learners.q_function import q_function
 from jrcjax.params import EnvParams, check_params
 from jrcjax.source import check_source, source_of
-from jrcjax.training import check_keys
 from jrcjax.types import Float, Key
 from jrcjax.value_learning import greedy_policy
 
@@ -136,7 +135,7 @@ class SavedAgent:
         check_params(params)
         _check_fit("params", spec_of(params), spec_of(self.params))
         key = jax.random.key(0) if key is None else key
-        check_keys(key, 0, "one key, as jax.random.key returns it")
+        require_keys(key, 0, "one key, as jax.random.key returns it")
         if type(episodes) is not int or episodes < 1:
             refuse("episodes", str(episodes), "an integer >= 1")
         if not 0.0 <= epsilon <= 1.0:

@@ -6,11 +6,12 @@ import jax
 import jax.numpy as jnp
 
 from jrcjax import exploration, n_step, slot
-from jrcjax.checks import refuse, require_type
-from jrcjax.episodes import Log, init_agent, learner_for, run_episodes
+from jrcjax.checks import refuse, require_keys, require_type
+from jrcjax.episodes import Log, check_training, init_agent, learner_for, run_episodes, spec_of
 from jrcjax.hparams import Config, HParams
 from jrcjax.learners import Source, Spec
 from jrcjax.learners.q_function import q_function
+from jrcjax.memory import check_memory
 from jrcjax.n_step import NStepTransition
 from jrcjax.params import EnvParams
 from jrcjax.replay import Transition
@@ -76,8 +77,14 @@ def train_source(key: Key, env_params: EnvParams, hparams: HParams, config: Conf
 
     Returns:
       What is handed on, and the log of the training, [episodes].
+
+    Raises:
+      ValueError: naming the field, the value and what is allowed, before anything compiles.
     """
+    check_training(env_params, hparams, config)
+    require_keys(key, 0, "one key, as jax.random.key returns it; use vmap for several")
     learner = learner_for("ddqn", env_params, config)
+    check_memory(learner, spec_of(env_params), config, agents=1)
     agent, log = run_episodes(init_agent(key, hparams, learner), 0, config.episodes, env_params, hparams, learner)
     policy = learner.policy(agent.learner)
     return source_of(key, policy, agent.learner.weights, env_params, hparams, config), log

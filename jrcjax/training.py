@@ -8,12 +8,13 @@ from collections.abc import Callable
 import jax
 import jax.numpy as jnp
 
-from jrcjax.checks import refuse
-from jrcjax.episodes import AgentState, Log, init_agent, learner_for, run_episodes, spec_of
-from jrcjax.hparams import Config, HParams, check_config, check_hparams
+from jrcjax.checks import refuse, require_keys, require_type
+from jrcjax.episodes import AgentState, Log, check_training, init_agent, learner_for, run_episodes, spec_of
+from jrcjax.hparams import Config, HParams
 from jrcjax.learners import Learner, LearnerFactory, Source, Spec, make_learner
+from jrcjax.memory import check_memory
 from jrcjax.parallel import over_agents, pad_agents, padded
-from jrcjax.params import EnvParams, check_params
+from jrcjax.params import EnvParams
 from jrcjax.presets import paper_params
 from jrcjax.source import check_source, train_source
 from jrcjax.types import Key
@@ -51,8 +52,9 @@ def train(
     """
     hparams, config = filled_in(hparams, config)
     check_training(env_params, hparams, config)
-    check_keys(key, 0, "one key, as jax.random.key returns it; use vmap or train_agents for several")
+    require_keys(key, 0, "one key, as jax.random.key returns it; use vmap or train_agents for several")
     rule = learner_for(learner, env_params, config)
+    check_memory(rule, spec_of(env_params), config, agents=1)
     paper_source = _check_or_choose_source(source, rule, spec_of(env_params), config)
     return _from_scratch(key, source, (env_params, hparams, paper_source), rule, config)
 
@@ -98,12 +100,16 @@ def train_agents(
     """
     hparams, config = filled_in(hparams, config)
     check_training(env_params, hparams, config)
-    check_keys(keys, 1, "an array of at least one key, as jax.random.split returns it")
+    require_keys(keys, 1, "an array of at least one key, as jax.random.split returns it")
     spec, agents = spec_of(env_params), keys.shape[0]
+    if source is not None:
+        require_type("source", source, Source)
     if source is not None and any(jnp.shape(leaf)[:1] != (agents,) for leaf in jax.tree.leaves(source)):
         refuse("source", "other leading axes", f"one source for each of the {agents} keys along the first axis")
     one_source = jax.tree.map(lambda leaf: leaf[0], source)
-    paper_source = _check_or_choose_source(one_source, make_learner(learner, spec, config), spec, config)
+    rule = make_learner(learner, spec, config)
+    check_memory(rule, spec, config, padded(agents))
+    paper_source = _check_or_choose_source(one_source, rule, spec, config)
     run = _many_agents(learner, spec, config)
     done = run((env_params, hparams, paper_source), pad_agents((keys, source), padded(agents)))
     return jax.tree.map(lambda leaf: leaf[:agents], done)
@@ -133,23 +139,6 @@ def _check_or_choose_source(source: Source | None, learner: Learner, spec: Spec,
     return paper_source
 
 
-def check_keys(keys: Key, dimensions: int, allowed: str) -> None:
-    """Raises ValueError unless `keys` is an array of PRNG keys with so many dimensions."""
-    if not isinstance(keys, jax.Array):
-        refuse("key", f"object of type {type(keys).__name__}", allowed)
-    typed = jnp.issubdtype(keys.dtype, jax.dtypes.prng_key)
-    shape = keys.shape if typed else keys.shape[:-1]  # an old-style key is an array of two words
-    if len(shape) != dimensions or 0 in shape:
-        refuse("key", f"shape {keys.shape}", allowed)
-
-
 def filled_in(hparams: HParams | None, config: Config | None) -> tuple[HParams, Config]:
     """Table I's hyperparameters and settings where there are none."""
     return HParams() if hparams is None else hparams, Config() if config is None else config
-
-
-def check_training(env_params: EnvParams, hparams: HParams, config: Config) -> None:
-    """Raises ValueError naming the field, the value and what is allowed."""
-    check_params(env_params)
-    check_hparams(hparams)
-    check_config(config)

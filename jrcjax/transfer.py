@@ -6,13 +6,14 @@ from typing import NamedTuple
 
 import jax
 
-from jrcjax.checks import refuse
-from jrcjax.episodes import AgentState, Log, init_agent, learner_for, run_episodes, spec_of
+from jrcjax.checks import refuse, require_keys
+from jrcjax.episodes import AgentState, Log, check_training, init_agent, learner_for, run_episodes, spec_of
 from jrcjax.hparams import Config, HParams
-from jrcjax.learners import Source
+from jrcjax.learners import LEARNERS, Source
+from jrcjax.memory import check_memory
 from jrcjax.params import EnvParams
 from jrcjax.source import train_source
-from jrcjax.training import check_keys, check_training, filled_in
+from jrcjax.training import filled_in
 from jrcjax.types import Key
 
 TARGET_LEARNERS = ("tlwd", "dpr", "ddqn", "q_learning", "round_robin")
@@ -69,12 +70,16 @@ def transfer(
     hparams, config = filled_in(hparams, config)
     check_training(source_params, hparams, config)
     check_training(target_params, hparams, config)
-    check_keys(key, 0, "one key, as jax.random.key returns it; use vmap for several")
+    require_keys(key, 0, "one key, as jax.random.key returns it; use vmap for several")
     if spec_of(source_params)[:2] != spec_of(target_params)[:2]:
         shape, actions, _ = spec_of(target_params)
         allowed = f"levels {source_params.shape} and {source_params.num_actions} actions, as the source has"
         refuse("target_params", f"levels {shape} and {actions} actions", allowed)
+    if not isinstance(learners, tuple | list):
+        refuse("learners", repr(learners), f"a tuple of {', '.join(map(repr, LEARNERS))}")
     rules = {name: learner_for(name, target_params, config) for name in learners}
+    for rule in rules.values():
+        check_memory(rule, spec_of(target_params), config, agents=1)
     source, source_log = train_source(key, source_params, hparams, config)
     agents, logs = {}, {}
     for name, rule in rules.items():

@@ -47,6 +47,6 @@ def choice(field: str, name: str, allowed: tuple[str, ...]) -> int:
     Raises:
       ValueError: naming the field, the value and what is allowed.
     """
-    if name not in allowed:
+    if not isinstance(name, str) or name not in allowed:
         raise ValueError(f"{field}: {name!r} is unknown; allowed: {', '.join(map(repr, allowed))}")
     return allowed.index(name)

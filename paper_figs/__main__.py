@@ -11,6 +11,7 @@ from pathlib import Path
 import tyro
 from rich.console import Console
 
+from sweeps import interrupts
 from sweeps.options import FLAGS, Count, Counts, Folder, Preset
 from sweeps.sweep import Size, size_of
 
@@ -94,7 +95,11 @@ def main(args: list[str] | None = None) -> int:
     out = options.out or Path("out/smoke" if options.smoke else "out")
     try:
         size = size_of(options.seeds, options.episodes, options.preset, options.smoke)
-        written = make_figures(options.only, size, out, Console(stderr=True))
+        with interrupts.terminable():
+            written = make_figures(options.only, size, out, Console(stderr=True))
+    except KeyboardInterrupt:
+        print(interrupts.how_to_go_on(), file=sys.stderr)
+        return interrupts.STATUS
     except (ValueError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

@@ -11,6 +11,7 @@ import tyro
 from rich.console import Console
 
 from jrcjax.checks import refuse
+from sweeps import interrupts
 from sweeps.custom import CUSTOM, Custom, Options, custom_sweep
 from sweeps.options import FLAGS, Count, Preset
 from sweeps.sweep import size_of
@@ -89,8 +90,12 @@ def main(args: list[str] | None = None) -> int:
         own = _own(command, (*SWEEPS, SOURCE.name))
         sweep = own.sweep if own else SWEEPS[command.name]
         options = {"resume": command.resume, "save_agents": command.save_agents}
-        folder = run_sweep(sweep, size, command.out, console, **options)
+        with interrupts.terminable():
+            folder = run_sweep(sweep, size, command.out, console, **options)
         written = custom.write(folder, own, size.seeds) if own else []
+    except KeyboardInterrupt:
+        print(interrupts.how_to_go_on("--resume"), file=sys.stderr)
+        return interrupts.STATUS
     except (ValueError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

@@ -104,7 +104,12 @@ def run_sweep(
     seconds = expected_seconds([sweep], size, out)
     console.print(_announcement(sweep, size, todo, seconds))
     with files.locked(folder):
-        _run_blocks(sweep, size, out, console, seconds, save_agents)
+        try:
+            _run_blocks(sweep, size, out, console, seconds, save_agents)
+        except (KeyboardInterrupt, OSError):
+            saved = store.in_words(store.finished_seeds(folder))
+            console.print(f"{sweep.name}: stopped; saved in {folder}: {f'seeds {saved}' if saved else 'nothing yet'}")
+            raise
     return folder
 
 

@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from jrcjax.checks import refuse
+from jrcjax.checks import require_integer
 from jrcjax.hparams import Config, HParams
 from jrcjax.params import EnvParams
 from jrcjax.presets import PRESETS
 from jrcjax.types import choice
+
+MOST_SEEDS = 1_000_000
+"""Whose numbers fit the names of parts."""
+_MOST_EPISODES = 100_000  # whose log of a part still fits the memory, and whose slots 32 bits
 
 
 @dataclass(frozen=True)
@@ -48,10 +52,10 @@ class Size:
 
     def check(self) -> None:
         """Raises ValueError naming the field, the value and what is allowed."""
-        for field in ("seeds", "episodes"):
-            value = getattr(self, field)
-            if not isinstance(value, int) or isinstance(value, bool) or value < 1:
-                refuse(field, value if isinstance(value, int | float | str) else str(value), "an integer >= 1")
+        require_integer("seeds", self.seeds, 1, MOST_SEEDS)
+        require_integer("episodes", self.episodes, 1, _MOST_EPISODES)
+        require_integer("pretraining", self.pretraining, 0)
+        require_integer("demonstrations", self.demonstrations, 1, Config.replay_capacity - 1)
         choice("preset", self.preset, PRESETS)
 
     @property

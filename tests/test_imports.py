@@ -12,7 +12,8 @@ ROOT = Path(__file__).parents[1]
 ENVIRONMENT = {"slot", "environment", "exact", "divergence"}
 # What puts the parts together; modules of the package that are in none of these sets hold equations.
 TRAINING = {
-    "__init__", "training", "parallel", "episodes", "source", "transfer", "adapters", "render", "saved_agent", "saving",
+    "__init__", "training", "parallel", "episodes", "source", "transfer", "adapters", "render", "memory",
+    "saved_agent", "saving",
 }  # fmt: skip
 COMMANDS = {"sweeps.__main__"}  # runs sweeps and has one drawn; nothing imports it
 LEVELS = ("equations", "environment", "learners", "training", "sweeps", "paper_figs", "commands")

@@ -3,6 +3,8 @@
 import errno
 import json
 import os
+import shlex
+import signal
 import subprocess
 import sys
 import time
@@ -14,7 +16,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from sweeps import files, parts, run, sources, store
+from sweeps import files, interrupts, parts, run, sources, store
 from sweeps.__main__ import main
 from sweeps.registry import SWEEPS
 from sweeps.run import run_sweep
@@ -237,6 +239,7 @@ print(kills, part_way)
 """
 
 
+@pytest.mark.slow
 def test_results_are_the_same_after_twenty_kills(tmp_path):
     command = [sys.executable, "-W", "ignore", "-c", _KILLED, str(tmp_path), "25"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
@@ -346,3 +349,62 @@ def test_results_name_what_decides_their_last_bit(folder):
     assert made_elsewhere(part) == []
     made["machine"]["cpu_features"] = ["fma"]
     assert made_elsewhere(part)[0].startswith("cpu_features: ['fma'] there, ")
+
+
+# --- Kills and interrupts of the command itself -----------------------------------------------------------------------
+
+
+def command(out: Path, *flags: str) -> list[str]:
+    run_it = ["run", "fig5a", "--episodes", "2", "--seeds", "160", "--out", str(out), *flags]
+    return [sys.executable, "-m", "sweeps", *run_it]
+
+
+def started(out: Path, parts_wanted: int, *flags: str) -> subprocess.Popen:
+    """The command, when it has written so many parts."""
+    process = subprocess.Popen(command(out, *flags), cwd=ROOT, stderr=subprocess.PIPE, text=True)
+    while process.poll() is None and len(list(out.glob("fig5a/*.nc"))) < parts_wanted:
+        time.sleep(0.002)
+    return process
+
+
+@pytest.mark.slow
+def test_the_command_goes_on_after_an_interrupt_and_a_kill_with_the_same_results(tmp_path):
+    subprocess.run(command(tmp_path / "whole"), cwd=ROOT, check=True, capture_output=True)
+    out, whole = tmp_path / "stopped", digests(tmp_path / "whole" / "fig5a")
+    process = started(out, 1)
+    process.send_signal(signal.SIGTERM)  # SIGINT is ignored by what runs in the background of a script
+    said = " ".join(process.communicate()[1].split())
+    assert process.returncode == 130
+    saved = parts.finished_seeds(out / "fig5a")
+    assert saved == {*range(len(saved))}
+    assert 16 <= len(saved) < 160
+    assert f"saved in {out}/fig5a: seeds {store.in_words(saved)}" in said.replace("/ ", "/")
+    assert f"interrupted; to go on: {shlex.join(['python', *command(out)[1:], '--resume'])}" in said
+    assert digests(out / "fig5a").items() <= whole.items()
+    process = started(out, len(saved) // 16 + 1, "--resume")
+    process.kill()
+    process.communicate()
+    assert process.returncode == -signal.SIGKILL
+    subprocess.run(command(out, "--resume"), cwd=ROOT, check=True, capture_output=True)
+    assert digests(out / "fig5a") == whole
+
+
+def test_a_request_to_end_interrupts_too():
+    before = signal.getsignal(signal.SIGTERM)
+    with pytest.raises(KeyboardInterrupt), interrupts.terminable():
+        signal.raise_signal(signal.SIGTERM)
+    assert signal.getsignal(signal.SIGTERM) is before
+
+
+def test_an_interrupted_sweep_tells_what_is_saved(folder, monkeypatch, capsys):
+    def interrupted(*args):
+        raise KeyboardInterrupt
+
+    monkeypatch.setitem(SWEEPS, "cheap", CHEAP)
+    monkeypatch.setattr(run, "results_of", interrupted)
+    arguments = ["run", "cheap", "--seeds", "4", "--episodes", "1", "--out", str(folder.parent), "--resume"]
+    assert main(arguments) == 130
+    said = " ".join(capsys.readouterr().err.split())
+    assert "cheap: stopped; saved in " in said
+    assert "seeds 0 to 2" in said
+    assert "interrupted; to go on: python " in said

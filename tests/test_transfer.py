@@ -14,11 +14,11 @@ from sources import random_source
 
 import jrcjax
 from jrcjax import episodes
+from jrcjax.checks import require_keys
 from jrcjax.hparams import Config, HParams
 from jrcjax.learners import LEARNERS, Learner, Source, Spec
 from jrcjax.params import make_factor
 from jrcjax.source import demonstrate
-from jrcjax.training import check_keys
 from jrcjax.transfer import TARGET_LEARNERS, Transfer, target_key
 
 CONFIG = Config(
@@ -326,10 +326,10 @@ def test_what_is_not_one_key_is_refused(keys, params):
 
 
 def test_old_style_keys_are_keys():
-    check_keys(jax.random.PRNGKey(0), 0, "")
-    check_keys(jnp.stack([jax.random.PRNGKey(0)] * 2), 1, "")
+    require_keys(jax.random.PRNGKey(0), 0, "")
+    require_keys(jnp.stack([jax.random.PRNGKey(0)] * 2), 1, "")
     with pytest.raises(ValueError, match=r"^key: "):
-        check_keys(jax.random.PRNGKey(0), 1, "several")
+        require_keys(jax.random.PRNGKey(0), 1, "several")
 
 
 @pytest.mark.usefixtures("nothing_runs")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
+
 from jrcjax.checks import refuse
 from jrcjax.hparams import Config
 from jrcjax.learners.base import Learner, LearnerFactory, Source, Spec
@@ -34,6 +36,10 @@ def make_learner(learner: str | LearnerFactory, spec: Spec, config: Config) -> L
     if isinstance(learner, str):
         choice("learner", learner, tuple(LEARNERS))
         learner = LEARNERS[learner]
-    if not callable(learner):
-        refuse("learner", str(learner), f"{', '.join(map(repr, LEARNERS))}, or a function that makes a Learner")
-    return learner(spec, config)
+    allowed = f"{', '.join(map(repr, LEARNERS))}, or a function that makes a Learner"
+    if not callable(learner) or not isinstance(learner, Hashable):
+        refuse("learner", repr(learner), allowed)
+    made = learner(spec, config)
+    if not isinstance(made, Learner):
+        refuse("learner", f"a function that makes a {type(made).__name__}", allowed)
+    return made
