@@ -12,6 +12,8 @@ from typing import Annotated
 
 import tyro
 
+from sweeps.options import FLAGS, File
+
 NAMES = ("throughput", "scaling", "limit", "canary", "start", "sum_tree", "paper")
 
 
@@ -19,9 +21,11 @@ NAMES = ("throughput", "scaling", "limit", "canary", "start", "sum_tree", "paper
 class Options:
     """Measures speed and memory on this machine, each benchmark against the claim at the top of its file."""
 
-    names: Annotated[tuple[str, ...], tyro.conf.Positional] = ()
+    names: Annotated[
+        tyro.conf.Positional[tuple[str, ...]], tyro.conf.arg(metavar="[NAME ...]", help_behavior_hint="")
+    ] = ()
     """Benchmarks to run: throughput, scaling, limit, canary, start, sum_tree, paper. Default: throughput."""
-    json: Path | None = None
+    json: File = None
     """File for machine and results."""
     quick: bool = False
     """Shorter runs: two minutes for throughput."""
@@ -29,7 +33,7 @@ class Options:
 
 def main(args: list[str] | None = None) -> int:
     """Entry point; returns the exit status."""
-    options = tyro.cli(Options, prog="python -m benchmarks", args=args)
+    options = tyro.cli(Options, prog="python -m benchmarks", args=args, config=FLAGS)
     from jrcjax.provenance import machine, versions
 
     unknown = [name for name in options.names if name not in NAMES]

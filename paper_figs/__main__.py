@@ -12,6 +12,7 @@ import tyro
 from rich.console import Console
 
 from sweeps import interrupts
+from sweeps.options import FLAGS, Count, Counts, Folder, Preset
 from sweeps.sweep import Size, size_of
 
 
@@ -19,17 +20,17 @@ from sweeps.sweep import Size, size_of
 class Options:
     """Regenerates the paper's figures: PDF, PNG and CSV each; claims, regret, the seeds needed, and report.html."""
 
-    only: tuple[int, ...] = ()
-    """Numbers of the figures to draw. Default: all."""
-    seeds: int | None = None
+    only: Counts = ()
+    """Numbers of the figures to draw, 5 to 9. Default: all."""
+    seeds: Count = None
     """Independent seeds. Default: 10, or 2 with --smoke."""
-    episodes: int | None = None
+    episodes: Count = None
     """Episodes per seed. Default: 1000, or 20 with --smoke."""
-    out: Path | None = None
+    out: Folder = None
     """Folder for the figures; results go to its folder `results` and are used again. Default: out, or out/smoke."""
     smoke: bool = False
     """A tiny version of everything."""
-    preset: str = "paper"
+    preset: Preset = "paper"
     """Table of parameters: paper or paper_table."""
 
 
@@ -94,7 +95,7 @@ def make_figures(numbers: tuple[int, ...], size: Size, out: Path, console: Conso
 
 def main(args: list[str] | None = None) -> int:
     """Entry point; returns the exit status."""
-    options = tyro.cli(Options, prog="python -m paper_figs", args=args)
+    options = tyro.cli(Options, prog="python -m paper_figs", args=args, config=FLAGS)
     from jrcjax import parallel  # after parsing, so that --help and errors come at once
 
     parallel.use_all_cores()

@@ -1,4 +1,4 @@
-"""Command line: `python -m sweeps list` and `python -m sweeps run NAME`."""
+"""Runs parameter sweeps: all points and seeds of one as a single compiled program, results as netCDF files."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from rich.console import Console
 from jrcjax.checks import refuse
 from sweeps import interrupts
 from sweeps.custom import CUSTOM, Custom, Options, custom_sweep
+from sweeps.options import FLAGS, Count, Preset
 from sweeps.sweep import Study, size_of
 
 
@@ -25,15 +26,15 @@ class List:
 class Run:
     """Run one sweep or study; results go to OUT/NAME, with what a study concludes in OUT/NAME/summary."""
 
-    name: tyro.conf.Positional[str]
-    """A sweep's or study's name, as `list` shows it, or custom."""
-    seeds: int | None = None
+    name: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="NAME")]
+    """A sweep's or study's name, as `list` shows it; custom for one of your own."""
+    seeds: Count = None
     """Independent seeds. Default: 10 (multiverse 4), or 2 with --smoke."""
-    episodes: int | None = None
+    episodes: Count = None
     """Episodes per seed. Default: 1000 (multiverse 500), or 20 with --smoke."""
-    preset: str = "paper"
+    preset: Preset = "paper"
     """Table of parameters: paper or paper_table."""
-    out: Path = Path("out/results")
+    out: Annotated[Path, tyro.conf.arg(metavar="DIR")] = Path("out/results")
     """Folder for results."""
     resume: bool = False
     """Continue where an earlier run with the same configuration stopped."""
@@ -48,9 +49,9 @@ class Run:
 class Verify:
     """Compute parts of results anew and compare them bit for bit; exit status 1 if anything differs."""
 
-    folder: tyro.conf.Positional[Path]
+    folder: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="DIR")]
     """Folder of one sweep's parts, such as out/results/fig6."""
-    parts: int | None = None
+    parts: Count = None
     """How many parts, evenly spread. Default: all."""
 
 
@@ -63,7 +64,7 @@ Command = (
 
 def main(args: list[str] | None = None) -> int:
     """Entry point; returns the exit status."""
-    command = tyro.cli(Command, prog="python -m sweeps", args=args)
+    command = tyro.cli(Command, prog="python -m sweeps", args=args, description=__doc__, config=FLAGS)
     from jrcjax import parallel  # after parsing, so that --help and errors come at once
     from jrcjax.types import choice
     from paper_figs import custom

@@ -29,18 +29,18 @@ _FOLDER = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 
 @dataclass(frozen=True)
 class Options:
-    """Of `run custom` alone: what varies, and around what."""
+    """Only for `run custom`: what varies, and around what."""
 
-    vary: Annotated[str, tyro.conf.arg(metavar="PATH=VALUES")] = ""
-    """The parameter on the x axis and its values: start:stop:count, start:stop:count:log, or a list a,b,c.
-    Paths: jrcjax/CONFIGURATION.md, e.g. env.speed.event_probability.high=0.1:0.9:9."""
-    set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="PATH=VALUE")] = ()
+    vary: Annotated[str, tyro.conf.arg(metavar="PATH=VALUES", help_behavior_hint="")] = ""
+    """The parameter on the x axis and its values: start:stop:count, start:stop:count:log, or a list with commas.
+    Such as env.speed.event_probability.high=0.1:0.9:9; the parameters are in jrcjax/CONFIGURATION.md."""
+    set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="PATH=VALUE ...", help_behavior_hint="")] = ()
     """Other parameters that differ from the base, the same at all points."""
-    learners: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME")] = ("ddqn",)
+    learners: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("ddqn",)
     """Any of round_robin, q_learning, ddqn, dpr, tlwd. The last two bring source agents, trained as in the paper."""
-    base: str = "target"
+    base: Annotated[str, tyro.conf.arg(metavar="NAME|FILE")] = "target"
     """The environment around which to vary: source, target, or a TOML file."""
-    folder: Annotated[str, tyro.conf.arg(name="name")] = CUSTOM
+    folder: Annotated[str, tyro.conf.arg(name="name", metavar="NAME")] = CUSTOM
     """Name of the folder in OUT that the results go to."""
 
 
