@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -37,6 +38,10 @@ class Run:
     """Continue where an earlier run with the same configuration stopped."""
     smoke: bool = False
     """A tiny version of the sweep."""
+    scheduler: str | None = None
+    """Address of a Dask scheduler whose workers compute, such as tcp://host:8786."""
+    workers: int | None = None
+    """Compute in so many processes on this machine, as a local Dask cluster."""
 
 
 @dataclass(frozen=True)
@@ -77,8 +82,9 @@ def main(args: list[str] | None = None) -> int:
             return _verify(command)
         choice("name", command.name, tuple(SWEEPS))
         size = size_of(command.seeds, command.episodes, command.preset, command.smoke)
-        with interrupts.terminable():
-            folder = run_sweep(SWEEPS[command.name], size, command.out, console, resume=command.resume)
+        size.check()
+        with interrupts.terminable(), _client(command) as client:
+            folder = run_sweep(SWEEPS[command.name], size, command.out, console, resume=command.resume, client=client)
     except KeyboardInterrupt:
         print(interrupts.how_to_go_on("--resume"), file=sys.stderr)
         return interrupts.STATUS
@@ -87,6 +93,15 @@ def main(args: list[str] | None = None) -> int:
         return 2
     print(folder)
     return 0
+
+
+def _client(command: Run) -> contextlib.AbstractContextManager:
+    """The client of the cluster that the command asks for, None if it asks for none."""
+    if command.scheduler is None and command.workers is None:
+        return contextlib.nullcontext()
+    from sweeps.distributed import client_of
+
+    return client_of(command.scheduler, command.workers)
 
 
 def _verify(command: Verify) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import jax
 import numpy as np
@@ -64,7 +65,7 @@ def expected_seconds(sweeps: list[Sweep], size: Size, out: Path) -> float:
     return agents + sum(estimate.block_seconds(sweep, size, len(seeds)) for sweep in sweeps for seeds in todo[sweep])
 
 
-def run_sweep(sweep: Sweep, size: Size, out: Path, console: Console, *, resume: bool) -> Path:
+def run_sweep(sweep: Sweep, size: Size, out: Path, console: Console, *, resume: bool, client: Any = None) -> Path:
     """Runs what is missing of a sweep.
 
     Args:
@@ -73,6 +74,7 @@ def run_sweep(sweep: Sweep, size: Size, out: Path, console: Console, *, resume: 
       out: results go to `out / sweep.name`, source agents to `out / "source"`.
       console: where the expected time and the progress are shown.
       resume: continue in a folder that holds results of the same configuration.
+      client: of the Dask cluster that computes (see `sweeps.distributed`); this process if None.
 
     Returns:
       The folder with the results.
@@ -95,7 +97,10 @@ def run_sweep(sweep: Sweep, size: Size, out: Path, console: Console, *, resume: 
     console.print(_announcement(sweep, size, todo, seconds))
     with files.locked(folder):
         try:
-            _run_blocks(sweep, size, out, console, seconds)
+            if client is None:
+                _run_blocks(sweep, size, out, console, seconds)
+            else:
+                _run_on_cluster(client, sweep, size, out, console)
         except (KeyboardInterrupt, OSError):
             saved = store.in_words(store.finished_seeds(folder))
             console.print(f"{sweep.name}: stopped; saved in {folder}: {f'seeds {saved}' if saved else 'nothing yet'}")
@@ -111,6 +116,17 @@ def _run_blocks(sweep: Sweep, size: Size, out: Path, console: Console, seconds: 
         task = progress.add_task(sweep.name, total=seconds)
         for seeds in to_do(sweep, size, out):
             _run_block(sweep, size, points, reference, seeds, out, lambda done: progress.advance(task, done))
+
+
+def _run_on_cluster(client: Any, sweep: Sweep, size: Size, out: Path, console: Console) -> None:
+    """The same on a cluster; the progress counts seeds, over all workers."""
+    from sweeps import distributed  # which builds upon this module
+
+    todo = to_do(sweep, size, out)
+    with Progress(*_COLUMNS, console=console) as progress:
+        task = progress.add_task(f"{sweep.name} on a cluster", total=sum(map(len, todo)))
+        for seeds in distributed.run_blocks(client, sweep, size, out, todo):
+            progress.advance(task, len(seeds))
 
 
 def _announcement(sweep: Sweep, size: Size, todo: list[range], seconds: float) -> str:
