@@ -63,11 +63,16 @@ def _cpuinfo(field: str) -> str:
     return next((line.split(":", 1)[1].strip() for line in lines if line.startswith(field)), "")
 
 
+def command() -> str:
+    """The command that this process was started with."""
+    return shlex.join(["python", *sys.orig_argv[1:]])
+
+
 def provenance() -> dict[str, Any]:
     """Command, time, versions, machine, and the commit of the source if it is in a git checkout."""
     modified = _git("status", "--porcelain", "--untracked-files=no")
     return {
-        "command": shlex.join(["python", *sys.orig_argv[1:]]),
+        "command": command(),
         "finished": datetime.now(UTC).isoformat(timespec="seconds"),
         "versions": versions(),
         "machine": machine(),

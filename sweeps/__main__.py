@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -42,6 +43,10 @@ class Run:
     """A tiny version of the sweep."""
     save_agents: bool = False
     """Save the trained agents beside the results, for jrcjax.load_agent."""
+    scheduler: str | None = None
+    """Address of a Dask scheduler whose workers compute, such as tcp://host:8786."""
+    workers: int | None = None
+    """Compute in so many processes on this machine, as a local Dask cluster."""
     custom: tyro.conf.OmitArgPrefixes[Options] = field(default_factory=Options)
 
 
@@ -91,8 +96,8 @@ def main(args: list[str] | None = None) -> int:
         size.check()
         sweeps = study.smoke_sweeps if command.smoke and study.smoke_sweeps else study.sweeps
         options = {"resume": command.resume, "save_agents": command.save_agents}
-        with interrupts.terminable():
-            written = [run_sweep(sweep, size, command.out, console, **options) for sweep in sweeps]
+        with interrupts.terminable(), _client(command) as client:
+            written = [run_sweep(sweep, size, command.out, console, **options, client=client) for sweep in sweeps]
             if own:
                 written += custom.write(written[0], own, size.seeds)
             if study.name in SUMMARIES:
@@ -115,6 +120,15 @@ def _own(command: Run, taken: tuple[str, ...]) -> Custom | None:
     if given:
         refuse("name", command.name, f"{CUSTOM}, for which alone --{given[0]} is")
     return None
+
+
+def _client(command: Run) -> contextlib.AbstractContextManager:
+    """The client of the cluster that the command asks for, None if it asks for none."""
+    if command.scheduler is None and command.workers is None:
+        return contextlib.nullcontext()
+    from sweeps.distributed import client_of
+
+    return client_of(command.scheduler, command.workers)
 
 
 def _verify(command: Verify) -> int:

@@ -13,6 +13,7 @@ import xarray as xr
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from jrcjax.checks import refuse
 from jrcjax.episodes import AgentState, Log
 from jrcjax.learners import Source
 from jrcjax.provenance import usable_cores
@@ -68,7 +69,14 @@ def expected_seconds(sweeps: list[Sweep], size: Size, out: Path) -> float:
 
 
 def run_sweep(
-    sweep: Sweep, size: Size, out: Path, console: Console, *, resume: bool, save_agents: bool = False
+    sweep: Sweep,
+    size: Size,
+    out: Path,
+    console: Console,
+    *,
+    resume: bool,
+    save_agents: bool = False,
+    client: Any = None,
 ) -> Path:
     """Runs what is missing of a sweep.
 
@@ -79,6 +87,7 @@ def run_sweep(
       console: where the expected time and the progress are shown.
       resume: continue in a folder that holds results of the same configuration.
       save_agents: save the trained agents beside the results.
+      client: of the Dask cluster that computes (see `sweeps.distributed`); this process if None.
 
     Returns:
       The folder with the results.
@@ -94,6 +103,8 @@ def run_sweep(
     if finished and not resume:
         raise ValueError(f"{folder} holds results of {finished} seeds already; add --resume, or choose another --out")
     if save_agents:
+        if client is not None:
+            refuse("save-agents", "with a cluster", "a run without --scheduler and --workers")
         check_agents(folder, sweep)
     if not todo:
         console.print(f"{sweep.name}: all {size.seeds} seeds are there, in {folder}")
@@ -103,7 +114,10 @@ def run_sweep(
     console.print(_announcement(sweep, size, todo, seconds))
     with files.locked(folder):
         try:
-            _run_blocks(sweep, size, out, console, seconds, save_agents)
+            if client is None:
+                _run_blocks(sweep, size, out, console, seconds, save_agents)
+            else:
+                _run_on_cluster(client, sweep, size, out, console)
         except (KeyboardInterrupt, OSError):
             saved = store.in_words(store.finished_seeds(folder))
             console.print(f"{sweep.name}: stopped; saved in {folder}: {f'seeds {saved}' if saved else 'nothing yet'}")
@@ -121,6 +135,17 @@ def _run_blocks(sweep: Sweep, size: Size, out: Path, console: Console, seconds: 
             keep = functools.partial(write_agents, out / sweep.name, sweep, size, points, seeds)
             told = functools.partial(progress.advance, task)
             _run_block(sweep, size, points, reference, seeds, out, told, keep if save_agents else None)
+
+
+def _run_on_cluster(client: Any, sweep: Sweep, size: Size, out: Path, console: Console) -> None:
+    """The same on a cluster; the progress counts seeds, over all workers."""
+    from sweeps import distributed  # which builds upon this module
+
+    todo = to_do(sweep, size, out)
+    with Progress(*_COLUMNS, console=console) as progress:
+        task = progress.add_task(f"{sweep.name} on a cluster", total=sum(map(len, todo)))
+        for seeds in distributed.run_blocks(client, sweep, size, out, todo):
+            progress.advance(task, len(seeds))
 
 
 def _announcement(sweep: Sweep, size: Size, todo: list[range], seconds: float) -> str:

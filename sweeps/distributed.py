@@ -1,0 +1,127 @@
+"""A sweep on the workers of a Dask cluster: a block of seeds is a task, and what it returns becomes a part here.
+
+Workers compute and never write, so they need no folder in common. A task whose worker is lost runs again on another
+one, and since a seed has the same bits wherever it runs, results are those of a local run. A worker uses all of its
+devices: it shards its agents over them like any other process.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+import xarray as xr
+
+from jrcjax import parallel
+from jrcjax.checks import refuse, require_integer
+from jrcjax.learners import Source
+from jrcjax.provenance import command
+from sweeps import files, sources, store
+from sweeps.program import points_of, reference_of
+from sweeps.run import results_of
+from sweeps.sweep import Size, Sweep
+
+_LOST_WORKERS = 10  # that one block may have before the run gives up
+
+_ADDRESS = "the address of a running scheduler, such as tcp://host:8786"
+
+
+@contextmanager
+def client_of(scheduler: str | None, workers: int | None) -> Iterator[Any]:
+    """A client of the scheduler at an address, or of a cluster of so many processes on this machine.
+
+    Raises:
+      ValueError: naming the flag, the value and what is allowed.
+    """
+    if scheduler is not None and workers is not None:
+        refuse("workers", workers, "none together with scheduler")
+    if scheduler is None:
+        require_integer("workers", workers, 1, 1024)
+    elif not re.fullmatch(r"(tcp|tls|ws|wss|ucx)://.+:\d+", scheduler):
+        refuse("scheduler", scheduler, _ADDRESS)
+    try:
+        from dask import config
+        from distributed import Client, LocalCluster
+    except ModuleNotFoundError as error:
+        refuse("scheduler, workers", f"without package {error.name}", "with the extra: pip install 'jrcjax[dask]'")
+    if scheduler is not None:
+        try:
+            client = Client(scheduler, timeout="10s", set_as_default=False)
+        except (OSError, ValueError) as error:
+            refuse("scheduler", scheduler, f"{_ADDRESS} ({error})")
+        with client:
+            yield client
+        return
+    with (
+        config.set({"distributed.scheduler.allowed-failures": _LOST_WORKERS}),
+        LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=":0") as cluster,
+        # As the default client it would give xarray locks of the cluster, also for files that only this process has.
+        Client(cluster, set_as_default=False) as client,
+    ):
+        yield client
+
+
+def run_blocks(client: Any, sweep: Sweep, size: Size, out: Path, todo: list[range]) -> Iterator[range]:
+    """Runs blocks of seeds on a cluster and writes their parts, and those of source agents, as they come in.
+
+    Args:
+      client: of the cluster.
+      sweep: what to run.
+      size: how much of it.
+      out: the folder with the results of all sweeps.
+      todo: the blocks.
+
+    Yields:
+      Each block, when its part is written.
+    """
+    from distributed import as_completed
+
+    blocks = {}
+    for seeds in todo:
+        source = None
+        if sweep.source and not sources.missing_sources(sweep.source, size, seeds, out):
+            kept = sources.sources_of(sweep.source, size, seeds, out, lambda seconds: None)
+            source = client.scatter(jax.tree.map(np.asarray, kept))
+        blocks[client.submit(_block, sweep, size, seeds, source, pure=False)] = seeds
+    for done in as_completed(list(blocks), loop=client.loop):
+        seeds, (trained, results) = blocks[done], done.result()
+        if sweep.source and trained is not None:
+            folder = out / sweep.source.name
+            with files.locked(folder, waiting=lambda held: None):
+                store.write_part(folder, seeds, _as_commanded(trained))
+                store.write_manifest(folder)
+        store.write_part(out / sweep.name, seeds, _as_commanded(results))
+        store.write_manifest(out / sweep.name)
+        done.release()
+        yield seeds
+
+
+def _as_commanded(data: xr.Dataset) -> xr.Dataset:
+    """A worker's results with the command of this process, since a worker's own says nothing."""
+    made = json.loads(data.attrs["provenance"]) | {"command": command()}
+    return data.assign_attrs(provenance=json.dumps(made, sort_keys=True))
+
+
+def _block(sweep: Sweep, size: Size, seeds: range, source: Source | None) -> tuple[xr.Dataset | None, xr.Dataset]:
+    """On a worker: the results of a block of seeds, and of the source agents that it had to train."""
+    _prepare()
+    trained = None
+    if sweep.source and source is None:
+        source, trained = sources.trained(sweep.source, size, seeds, lambda seconds: None)
+    points = points_of(sweep, size.preset)
+    reference = reference_of(points, size.episodes)
+    return trained, results_of(sweep, size, points, reference, seeds, source, lambda seconds: None)
+
+
+@functools.cache
+def _prepare() -> None:
+    """Makes a worker's process what the command line makes its own, once, before it has any array."""
+    parallel.use_all_cores()
+    parallel.keep_compiled()
