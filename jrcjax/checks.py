@@ -64,7 +64,7 @@ def require_type(field: str, value: Any, wanted: type) -> None:
 def require_integer(field: str, value: Any, least: int, most: int = 2**31 - 1) -> None:
     """Refuses what is not a Python integer in a range; NumPy's are none, since they would not compare as settings."""
     if type(value) is not int or not least <= value <= most:
-        refuse(field, value if type(value) in (int, float) else repr(value), f"a Python int from {least} to {most}")
+        refuse(field, value if type(value) in (int, float) else repr(value), f"an int from {least} to {most}")
 
 
 def require_keys(keys: Any, dimensions: int, allowed: str) -> None:

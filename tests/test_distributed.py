@@ -38,7 +38,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_results_of_a_local_run(tmp_path
 @pytest.mark.parametrize(
     ("flags", "message"),
     [
-        (["--workers", "0"], "workers: 0; allowed: a Python int from 1 to 1024"),
+        (["--workers", "0"], "workers: 0; allowed: an int from 1 to 1024"),
         (["--workers", "2", "--scheduler", "tcp://h:1"], "workers: 2; allowed: none together with scheduler"),
         (["--scheduler", "nonsense://"], "scheduler: 'nonsense://'; allowed: the address of a running scheduler"),
     ],
