@@ -10,7 +10,7 @@ STAMP := $(VENV)/.stamp
 PEERS_STAMP := $(VENV)/.peers
 
 .DEFAULT_GOAL := help
-.PHONY: setup figures test bench sweeps lint types lock-check lock clean help
+.PHONY: setup figures test bench peers sweeps lint types lock-check lock clean help
 
 setup: $(STAMP)  ## make .venv with the locked packages and this project
 
@@ -46,6 +46,8 @@ test: $(STAMP)  ## run the tests
 
 bench: $(STAMP) $(PEERS_STAMP)  ## time the code, beside its peers
 	$(PY) -m benchmarks $(ARGS)
+
+peers: $(STAMP) $(PEERS_STAMP)  ## install the peers, for benchmarks and for the tests of adapters
 
 # The peers come on top of the locked packages, whose versions they leave alone. The PyTorch is pinned here: of the
 # releases that the peers allow, installers would take the newest.
