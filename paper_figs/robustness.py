@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy import stats
 
@@ -110,7 +111,7 @@ def misrankings(data: xr.Dataset, environment: str) -> pd.DataFrame:
     rows = []
     for label, score in SCORES.items():
         scores = np.stack([score.of(data, name) for name in names])
-        for n in (n for n in STUDY_SIZES if n < seeds):
+        for n in (n for n in STUDY_SIZES if 3 * n <= seeds):  # larger ones are too much like the whole
             rows.append((environment, label, n, ranking.misranking(scores, n), seeds))
     return pd.DataFrame(rows, columns=["environment", "score", "study_seeds", "misranking", "n_seeds"])
 
@@ -153,44 +154,48 @@ def draw(found: dict[str, pd.DataFrame]) -> Figure:
     environments = list(dict.fromkeys(profile.environment))
     figure = Figure(figsize=(style.TWO_COLUMNS[0], 2.1 * len(environments) + 0.5))
     rows = figure.subplots(len(environments), 3, squeeze=False)
-    for axes, environment in zip(rows, environments, strict=True):
+    for (final, soon, misled), environment in zip(rows, environments, strict=True):
         here = profile.query(f"environment == {environment!r}")
-        for name, look in ((name, style.LOOKS[name]) for name in _RIVALS):
-            final = here.query(f"algorithm == {name!r} and profile == 'gap'")
-            soon = here.query(f"algorithm == {name!r} and profile == 'converged'")
-            for panel, curve, scale in ((axes[0], final, 100), (axes[1], soon, 1)):
-                if not curve.empty:
-                    line = {"color": look.color, "label": look.label, "marker": look.marker, "markevery": 0.2}
-                    panel.step(scale * curve.x, curve.share, where="post", **line)
-                    band = {"color": look.color, "alpha": 0.2, "linewidth": 0, "step": "post"}
-                    panel.fill_between(scale * curve.x, curve.low, curve.high, **band)
-        axes[0].axvline(100 * TOLERANCE, color="0.6", linewidth=0.8, linestyle=":")
-        axes[0].set_xlabel("gap to the optimum, last 100 episodes (%)")
-        axes[0].set_ylabel(f"{environment}\nshare of seeds")
-        axes[1].set_xlabel(f"episodes until within {TOLERANCE:.0%} of the optimum")
-        axes[1].set_ylabel("share of seeds")
-        axes[1].set_xscale("log")
-        for panel in axes[:2]:
-            panel.set_ylim(-0.02, 1.02)
-        lines = ("-", "--", "-.", ":")
-        ranked = ("reward", "throughput", "miss_detection", "convergence episode")
-        for label, line in zip(ranked, lines, strict=True):
-            curve = wrong.query(f"environment == {environment!r} and score == {label!r}")
-            axes[2].plot(
-                curve.study_seeds, curve.misranking, line, marker="o", color="black", label=label.replace("_", " ")
-            )
-        axes[2].axhline(1 - CONFIDENCE, color="0.6", linewidth=0.8, linestyle=":")
-        axes[2].set_xscale("log")
-        sizes = sorted(set(wrong.study_seeds))
-        axes[2].set_xticks(sizes, [str(size) for size in sizes])
-        axes[2].minorticks_off()
-        axes[2].set_ylim(-0.02, 1.02)
-        axes[2].set_xlabel("seeds of a study")
-        axes[2].set_ylabel("ranks learners wrongly")
-        axes[2].legend(title="ranked by", fontsize=5.5, title_fontsize=5.5)
+        _draw_shares(final, here.query("profile == 'gap'"), 100)
+        final.axvline(100 * TOLERANCE, color="0.6", linewidth=0.8, linestyle=":")
+        final.set_xlabel("gap to the optimum, last 100 episodes (%)")
+        final.set_ylabel(f"{environment}\nshare of seeds")
+        _draw_shares(soon, here.query("profile == 'converged'"), 1)
+        soon.set_xlabel(f"episodes until within {100 * TOLERANCE:.0f} % of the optimum")
+        soon.set_xscale("log")
+        _draw_misrankings(misled, wrong.query(f"environment == {environment!r}"))
+    rows[0, 2].legend(title="ranked by", fontsize=6, title_fontsize=6)
     handles = {h.get_label(): h for panel in rows[:, 0] for h in panel.get_lines() if not h.get_label().startswith("_")}
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=6)
-    figure.suptitle(
-        f"What {int(profile.n_seeds.max())} seeds show (bands: 95 % intervals), and how often fewer mislead"
-    )
+    seeds = int(profile.n_seeds.max())
+    figure.suptitle(f"What {seeds} seeds show (bands: 95 % intervals), and how often fewer mislead")
     return figure
+
+
+def _draw_shares(axes: Axes, profile: pd.DataFrame, scale: float) -> None:
+    """Shares of seeds against x, a step function per learner; Round Robin's would be zero."""
+    for name in _RIVALS:
+        curve, look = profile.query(f"algorithm == {name!r}"), style.LOOKS[name]
+        if curve.empty:
+            continue
+        line: dict[str, Any] = {"color": look.color, "label": look.label, "marker": look.marker, "markevery": 0.2}
+        axes.step(scale * curve.x, curve.share, where="post", **line)
+        axes.fill_between(scale * curve.x, curve.low, curve.high, step="post", color=look.color, alpha=0.2, linewidth=0)
+    axes.set_ylim(-0.02, 1.02)
+    axes.set_ylabel("share of seeds")
+
+
+def _draw_misrankings(axes: Axes, wrong: pd.DataFrame) -> None:
+    """How often studies of n seeds rank the learners differently, by what they are ranked by."""
+    looks = {"reward": "-o", "throughput": "--s", "miss_detection": "-.^", "convergence episode": ":D"}
+    for score, look in looks.items():
+        curve = wrong.query(f"score == {score!r}")
+        axes.plot(curve.study_seeds, curve.misranking, look, color="black", label=score.replace("_", " "))
+    axes.axhline(1 - CONFIDENCE, color="0.6", linewidth=0.8, linestyle=":")
+    axes.set_xscale("log")
+    sizes = sorted(set(wrong.study_seeds))
+    axes.set_xticks(sizes, [str(size) for size in sizes])
+    axes.minorticks_off()
+    axes.set_ylim(-0.02, 1.02)
+    axes.set_xlabel("seeds of a study")
+    axes.set_ylabel("ranks learners wrongly")
