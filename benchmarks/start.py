@@ -36,7 +36,7 @@ size = Size()
 points = program.points_of(sweep, size.preset)
 spec = spec_of(jax.tree.map(lambda a: a[0], points.params))
 compiled = program.program_of(sweep.learners, spec, sweep.config(size), program.chunk_of(size.episodes))
-lanes = parallel.padded(len(sweep.x_values) * size.seeds)
+lanes = parallel.padded(1)  # of every group
 source = None
 if sweep.source:
     def train(key):
