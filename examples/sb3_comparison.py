@@ -1,27 +1,31 @@
 """Stable-Baselines3's DQN beside this package's Double DQN: where the two land in the same environment.
 
-Same network, optimiser, memory, mini-batch, discount, target period and exploration; Stable-Baselines3 has no double
-DQN, and a Huber loss. The greedy policies of both are evaluated exactly after each episode, and averaged over the last
+Same network, optimiser, memory, mini-batch, discount, target period and exploration. Stable-Baselines3 has no double
+DQN, its loss is Huber's, linear for errors beyond 1, and it clips gradients; both act on rewards of -100. So both
+libraries are given all rewards divided by 100 (`--scale 1` leaves them as they are).
+
+The greedy policies of both are evaluated exactly after each episode, without the scale, and averaged over the last
 quarter of the episodes. Needs the extra "clients"; a seed takes Stable-Baselines3 about half a minute.
 
     .venv/bin/python examples/sb3_comparison.py --seeds 5
 """
 
+import dataclasses
 from dataclasses import dataclass
 
-import gymnasium  # pyright: ignore[reportMissingImports]
 import jax
 import jax.numpy as jnp
 import numpy as np
+import torch  # pyright: ignore[reportMissingImports]
 import tyro
 from scipy import stats
 from stable_baselines3 import DQN  # pyright: ignore[reportMissingImports]
 from stable_baselines3.common.callbacks import BaseCallback  # pyright: ignore[reportMissingImports]
 
 import jrcjax
-import jrcjax.adapters  # registers the environments
 import jrcjax.parallel
 from jrcjax import states
+from jrcjax.adapters import GymnasiumEnv
 from jrcjax.types import Float
 
 
@@ -33,6 +37,8 @@ class Arguments:
     """Episodes per seed; exploration falls to 1 % over the first half."""
     seeds: int = 5
     """Agents of each kind."""
+    scale: float = 0.01
+    """By which all rewards are multiplied while training."""
 
 
 class Evaluation(BaseCallback):
@@ -58,7 +64,7 @@ def reward_of(params: jrcjax.EnvParams, actions: jax.Array) -> Float:
 
 
 def train_sb3(
-    env: gymnasium.Env, params: jrcjax.EnvParams, hparams: jrcjax.HParams, config: jrcjax.Config, seed: int
+    env: GymnasiumEnv, params: jrcjax.EnvParams, hparams: jrcjax.HParams, config: jrcjax.Config, seed: int
 ) -> list[float]:
     """One agent's rewards, [episodes]."""
     slots = config.episodes * params.max_steps_in_episode
@@ -83,25 +89,26 @@ def train_sb3(
     return evaluation.rewards
 
 
-def train_both(
-    env: gymnasium.Env, params: jrcjax.EnvParams, episodes: int, seeds: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Exact rewards per slot of Stable-Baselines3's agents and of ours, [seeds, episodes] each."""
+def train_both(params: jrcjax.EnvParams, episodes: int, seeds: int, scale: float) -> tuple[np.ndarray, np.ndarray]:
+    """Exact rewards per slot of Stable-Baselines3's agents and of ours, [seeds, episodes] each, without the scale."""
+    scaled = dataclasses.replace(params, reward_weights=scale * params.reward_weights)
+    env = GymnasiumEnv(scaled)
     hparams = jrcjax.HParams(epsilon_slots=jnp.float32(episodes * params.max_steps_in_episode / 2))
     config = jrcjax.Config(episodes=episodes)
+    torch.set_num_threads(1)  # more only wait for each other in networks as small as these
     theirs = np.array([train_sb3(env, params, hparams, config, seed) for seed in range(seeds)])
     keys = jax.random.split(jax.random.key(0), seeds)
-    _, log = jrcjax.train_agents(keys, params, hparams, learner="ddqn", config=config)
-    return theirs, np.asarray(log.policy_reward)
+    _, log = jrcjax.train_agents(keys, scaled, hparams, learner="ddqn", config=config)
+    return theirs, np.asarray(log.policy_reward) / scale
 
 
 def main(args: list[str] | None = None) -> None:
     """Trains both and prints means with 95 % intervals over seeds."""
     given = tyro.cli(Arguments, args=args)
     params = jrcjax.paper_params("target")
-    env = gymnasium.make("jrcjax/JRC-target-v0")
     optimum = float(jrcjax.exact.evaluate_policy(params, jrcjax.exact.optimal_policy(params)).reward)
-    late = [r[:, -(given.episodes // 4) :].mean(axis=1) for r in train_both(env, params, given.episodes, given.seeds)]
+    rewards = train_both(params, given.episodes, given.seeds, given.scale)
+    late = [of_agents[:, -(given.episodes // 4) :].mean(axis=1) for of_agents in rewards]
     print(f"reward per slot in the last {given.episodes // 4} of {given.episodes} episodes; optimum {optimum:.2f}")
     for name, rewards in zip(("Stable-Baselines3, DQN", "jrcjax, Double DQN"), late, strict=True):
         low, high = stats.ttest_1samp(rewards, 0.0).confidence_interval()

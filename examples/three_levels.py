@@ -33,6 +33,12 @@ class Arguments:
     """The picture."""
 
 
+@jax.jit
+def best_of(params: jrcjax.EnvParams) -> jrcjax.exact.LongRun:
+    """Long-run means per slot of the optimal policy."""
+    return jrcjax.exact.evaluate_policy(params, jrcjax.exact.optimal_policy(params))
+
+
 def main(args: list[str] | None = None) -> None:
     """Trains, solves, draws."""
     given = tyro.cli(Arguments, args=args)
@@ -41,7 +47,7 @@ def main(args: list[str] | None = None) -> None:
     form = "the table of all states" if config.uses_table(params.num_states) else "the rows of a mini-batch"
     print(f"{params.num_states} states, {params.num_actions} actions; the loss is computed on {form}")
 
-    optimum = jrcjax.exact.evaluate_policy(params, jrcjax.exact.optimal_policy(params))
+    optimum = best_of(params)
     keys = jax.random.split(jax.random.key(0), given.seeds)
     _, log = jrcjax.train_agents(keys, params, learner="ddqn", config=config)
     learned = np.asarray(log.policy_reward)  # [seeds, episodes], exact and without exploration

@@ -82,12 +82,10 @@ def test_own_learner_trains_like_the_others():
 
 def test_stable_baselines3_beside_ours():
     pytest.importorskip("stable_baselines3", reason="needs the extra 'clients'")
-    from jrcjax.adapters import GymnasiumEnv
-
     params = tiny_params()
     best = np.asarray(jrcjax.exact.expected_reward(params)).max(axis=1)
     optimum = best @ np.asarray(jrcjax.exact.stationary_distribution(params))
-    theirs, ours = example("sb3_comparison").train_both(GymnasiumEnv(params), params, episodes=5, seeds=2)
+    theirs, ours = example("sb3_comparison").train_both(params, episodes=5, seeds=2, scale=0.01)
     for rewards in (theirs, ours):
         assert rewards.shape == (2, 5)
         assert (rewards <= optimum + 1e-3).all()
