@@ -22,9 +22,10 @@ SETTINGS = settings(max_examples=60, deadline=None, derandomize=True, suppress_h
 def nothing_compiles():
     compiled = []
 
-    def listen(event, _, **__):
-        if "backend_compile" in event:
-            compiled.append(event)
+    def listen(event, _, fun_name="", **__):
+        # The first array of a shape compiles its own transfer, in no time.
+        if "backend_compile" in event and fun_name not in ("jit(stage)", "jit(convert_element_type)"):
+            compiled.append(fun_name)
 
     jax.monitoring.register_event_duration_secs_listener(listen)
     try:

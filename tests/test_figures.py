@@ -230,7 +230,7 @@ def test_one_command_writes_everything(tmp_path):
     ("arguments", "message"),
     [
         (["--only", "4"], "only: [4]; allowed: 5, 6, 7, 8, 9"),
-        (["--seeds", "-1"], "seeds: -1; allowed: an integer >= 1"),
+        (["--seeds", "-1"], "seeds: -1; allowed: an int from 1"),
         (["--preset", "x"], "preset: 'x' is unknown; allowed: 'paper', 'paper_table'"),
     ],
 )

@@ -18,9 +18,9 @@ from rich.console import Console
 
 from sweeps import files, interrupts, parts, run, sources, store
 from sweeps.__main__ import main
-from sweeps.registry import SWEEPS
+from sweeps.registry import EVERY_SWEEP, STUDIES, SWEEPS
 from sweeps.run import run_sweep
-from sweeps.sweep import Size
+from sweeps.sweep import Size, Study
 from sweeps.verify import made_elsewhere, sample_of, verify
 
 ROOT = Path(__file__).parents[1]
@@ -184,10 +184,10 @@ def test_a_killed_process_leaves_neither_lock_nor_temporary_files(tmp_path):
 
 def test_damaged_source_agents_are_trained_again(tmp_path, capsys):
     size = Size(seeds=2, episodes=1, pretraining=2, demonstrations=30)
-    first = sources.sources_of(size, range(2), tmp_path, lambda seconds: None)
+    first = sources.sources_of(sources.SOURCE, size, range(2), tmp_path, lambda seconds: None)
     part = store.part_path(tmp_path / "source", range(2))
     part.write_bytes(flipped(part.read_bytes(), 4321))
-    again = sources.sources_of(size, range(2), tmp_path, lambda seconds: None)
+    again = sources.sources_of(sources.SOURCE, size, range(2), tmp_path, lambda seconds: None)
     assert "set aside" in capsys.readouterr().err
     jax.tree.map(np.testing.assert_array_equal, first, again)
 
@@ -207,7 +207,7 @@ from sweeps import run, store
 from sweeps.registry import SWEEPS
 from sweeps.sweep import Size
 
-def made_up(sweep, size, points, reference, seeds, source, advance):
+def made_up(sweep, size, points, reference, seeds, source, advance, keep):
     rewards = np.stack([np.random.default_rng(seed).normal(size=20_000) for seed in seeds])
     about = {"configuration": '{"sweep": "fig5a"}', "provenance": '{"finished": "now"}'}
     return xr.Dataset({"reward": (("seed", "episode"), rewards)}, {"seed": np.array(seeds)}, about)
@@ -255,9 +255,11 @@ def test_results_are_the_same_after_twenty_kills(tmp_path):
 # --- Seeds, devices and verification ----------------------------------------------------------------------------------
 
 _ON_DEVICES = """
-import sys
+import os, sys
 from pathlib import Path
 from jrcjax import parallel
+if not int(sys.argv[1]):
+    os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})  # before the threads are there
 parallel.use_all_cores()
 parallel.keep_compiled()
 import jax
@@ -273,10 +275,9 @@ run.run_sweep(ddqn, Size(seeds=int(sys.argv[2]), episodes=2), Path(sys.argv[3]),
 """
 
 
-def on_devices(devices: int, seeds: int, out: Path, pinned: bool = False) -> Path:
-    command = [sys.executable, "-c", _ON_DEVICES, str(devices), str(seeds), str(out)]
-    one_core = (lambda: os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})) if pinned else None
-    subprocess.run(command, cwd=ROOT, check=True, preexec_fn=one_core)
+def on_devices(devices: int | None, seeds: int, out: Path) -> Path:
+    command = [sys.executable, "-c", _ON_DEVICES, str(devices or 0), str(seeds), str(out)]
+    subprocess.run(command, cwd=ROOT, check=True)
     return out / "fig5a"
 
 
@@ -285,7 +286,7 @@ def test_a_seed_has_the_same_bits_on_two_devices_three_and_a_single_core(tmp_pat
     """Two blocks of seeds on two devices, one and a half on three, and what `use_all_cores` makes of one core."""
     two = on_devices(2, 35, tmp_path / "two")
     three = on_devices(3, 35, tmp_path / "three")
-    one_core = on_devices(0, 3, tmp_path / "one", pinned=True)
+    one_core = on_devices(None, 3, tmp_path / "one")
     assert digests(two) == digests(three)
     a, b = (store.load(folder, 3).drop_attrs() for folder in (two, one_core))
     assert a.identical(b)
@@ -313,7 +314,7 @@ def test_verifying_says_where_and_how_much_results_differ(folder, monkeypatch, c
     data["reward"][0, 0, 1, 0] += 0.5
     data["miss_detection"][0, 0, 2, 0] = np.nan
     store.write_part(folder, range(3), data)
-    monkeypatch.setitem(SWEEPS, "cheap", CHEAP)
+    monkeypatch.setitem(EVERY_SWEEP, "cheap", CHEAP)
     assert main(["verify", str(folder)]) == 1
     out = capsys.readouterr().out
     assert f"{part}: differs" in out
@@ -400,7 +401,7 @@ def test_an_interrupted_sweep_tells_what_is_saved(folder, monkeypatch, capsys):
     def interrupted(*args):
         raise KeyboardInterrupt
 
-    monkeypatch.setitem(SWEEPS, "cheap", CHEAP)
+    monkeypatch.setitem(STUDIES, "cheap", Study("cheap", "", (CHEAP,)))
     monkeypatch.setattr(run, "results_of", interrupted)
     arguments = ["run", "cheap", "--seeds", "4", "--episodes", "1", "--out", str(folder.parent), "--resume"]
     assert main(arguments) == 130

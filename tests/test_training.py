@@ -73,9 +73,10 @@ def assert_close(got, wanted):
 def test_log_has_one_finite_number_per_episode(learner, params, source):
     state, log = trained(learner, source=source)(jax.random.key(0), params, hparams_of())
     assert FIELDS[:3] == ("reward", "throughput", "miss_detection")
+    assert not log.diverged.any()
     for field in log:
         assert field.shape == (SMALL.episodes,)
-        assert field.dtype == jnp.float32
+        assert field.dtype == (jnp.bool_ if field is log.diverged else jnp.float32)
         assert np.isfinite(field).all()
     assert jax.random.key_data(state.key).tolist() == jax.random.key_data(jax.random.key(0)).tolist()
 
@@ -99,7 +100,9 @@ def test_nothing_is_weakly_typed_or_wider_than_32_bits(learner, params, source):
     shapes = jax.eval_shape(trained(learner, source=source), jax.random.key(0), params, hparams_of())
     for leaf in jax.tree.leaves(shapes):
         assert not leaf.weak_type
-        assert leaf.dtype in (jnp.float32, jnp.int32, jnp.uint32) or jnp.issubdtype(leaf.dtype, jax.dtypes.prng_key)
+        assert leaf.dtype in (jnp.float32, jnp.int32, jnp.uint32, jnp.bool_) or jnp.issubdtype(
+            leaf.dtype, jax.dtypes.prng_key
+        )
 
 
 @pytest.mark.parametrize("learner", LEARNERS)
@@ -162,7 +165,7 @@ def test_final_policy_is_the_one_that_the_log_evaluates(learner, params, source)
     policy = episodes.learner_for(learner, params, SMALL).policy(state.learner)
     assert policy.shape == (params.num_states, params.num_actions)
     np.testing.assert_allclose(policy.sum(axis=1), 1, rtol=1e-6)
-    assert_close(tuple(field[-1] for field in log[3:]), tuple(jrcjax.exact.evaluate_policy(params, policy)))
+    assert_close(tuple(field[-1] for field in log[3:6]), tuple(jrcjax.exact.evaluate_policy(params, policy)))
 
 
 # --- vmap -------------------------------------------------------------------------------------------------------------
