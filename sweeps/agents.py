@@ -10,7 +10,7 @@ from jrcjax import save_agents
 from jrcjax.episodes import AgentState
 from jrcjax.saving import LEARNING, acting_part
 from sweeps import store
-from sweeps.program import Points
+from sweeps.program import Points, joined
 from sweeps.sweep import Size, Sweep
 
 
@@ -20,7 +20,7 @@ def agents_path(folder: Path, seeds: range) -> Path:
 
 
 def write_agents(
-    folder: Path, sweep: Sweep, size: Size, points: Points, seeds: range, agents: dict[str, AgentState]
+    folder: Path, sweep: Sweep, size: Size, points: Points, seeds: range, groups: list[dict[str, AgentState]]
 ) -> Path:
     """Writes what the agents of a block act by; Round Robin has nothing of the kind.
 
@@ -30,16 +30,16 @@ def write_agents(
       size: how much of it.
       points: its points.
       seeds: the seeds of the block.
-      agents: by learner, the leading axis of every leaf is lanes, as in `sweeps.program.Progress`.
+      groups: of lanes, by learner, as in `sweeps.program.Progress`.
     """
     shape = (len(sweep.x_values), len(seeds))
     lanes = shape[0] * shape[1]
 
-    def kept(agent: AgentState) -> AgentState:
-        acting = agent._replace(learner=acting_part(agent.learner))
-        return jax.tree.map(lambda leaf: leaf[:lanes].reshape(*shape, *leaf.shape[1:]), acting)
+    def kept(name: str) -> AgentState:
+        agents = [group[name]._replace(learner=acting_part(group[name].learner)) for group in groups]
+        return jax.tree.map(lambda leaf: leaf[:lanes].reshape(*shape, *leaf.shape[1:]), joined(agents))
 
-    learning = {name: kept(agents[name]) for name in sweep.learners if name in LEARNING}
+    learning = {name: kept(name) for name in sweep.learners if name in LEARNING}
     return save_agents(agents_path(folder, seeds), learning, *points, config=sweep.config(size), seeds=seeds)
 
 

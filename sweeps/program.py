@@ -32,12 +32,7 @@ class Progress(NamedTuple):
     log: dict[str, Log]
     """By learner: [points, seeds, episodes] each."""
     groups: list[dict[str, AgentState]]
-    """Agents by learner after the chunk, gone with the next, in groups of lanes that fill the devices."""
-
-    @property
-    def agents(self) -> dict[str, AgentState]:
-        """All groups together; the leading axis of every leaf is lanes, of which the first points x seeds count."""
-        return jax.tree.map(lambda *leaves: jnp.concatenate(leaves), *self.groups)
+    """Agents by learner after the chunk, gone with the next, in groups of lanes; see `joined`."""
 
 
 class Points(NamedTuple):
@@ -174,5 +169,15 @@ def run_block(sweep: Sweep, size: Size, points: Points, seeds: range, source: So
 
 
 def joined(groups: list[Any]) -> Any:
-    """Groups of lanes as one, in memory."""
-    return jax.tree.map(lambda *parts: np.concatenate([np.asarray(part) for part in parts]), *groups)
+    """Groups of lanes as one, on the host.
+
+    Joined on the devices they would be exchanged between them, and a device that waits for another which has the work
+    of other groups before it waits until XLA gives up.
+    """
+
+    def join(*parts: Any) -> Any:
+        if jnp.issubdtype(parts[0].dtype, jax.dtypes.prng_key):
+            return jax.random.wrap_key_data(join(*map(jax.random.key_data, parts)))
+        return np.concatenate([np.asarray(part) for part in parts])
+
+    return jax.tree.map(join, *groups)

@@ -23,7 +23,7 @@ from sweeps.program import Points, Reference, points_of, reference_of, run_block
 from sweeps.sources import missing_sources, sources_of
 from sweeps.sweep import Size, Sweep
 
-Keep: TypeAlias = Callable[[dict[str, AgentState]], Any]
+Keep: TypeAlias = Callable[[list[dict[str, AgentState]]], Any]
 """What is done with a block's agents before its part is written."""
 _COLUMNS = (
     TextColumn("{task.description}"),
@@ -187,15 +187,15 @@ def results_of(
 
     `advance` is told how many of the expected seconds are done, `keep` is given the agents after their last episode.
     """
-    agents: dict[str, AgentState] = {}
+    groups: list[dict[str, AgentState]] = []
     logs: list[dict[str, Log]] = []
     for chunk in run_block(sweep, size, points, seeds, source):
         if not logs:
             advance(estimate.pretraining_seconds(sweep, size, len(seeds)))
         logs.append(chunk.log)
-        agents = chunk.agents
+        groups = chunk.groups
         advance(chunk.episodes * estimate.seconds_per_episode(sweep, len(seeds)))
     if keep:
-        keep(agents)
+        keep(groups)
     whole = jax.tree.map(lambda *parts: np.concatenate(parts, axis=-1), *logs)
     return store.dataset(sweep, size, seeds, whole, reference)

@@ -137,6 +137,8 @@ def test_the_program_is_compiled_once_for_all_blocks(tmp_path):
         # Three blocks, with a number of episodes that no other test uses, so that nothing is compiled yet.
         run_sweep(FIG5A, Size(seeds=2 * FIG5A.seeds_per_part + 1, episodes=3), tmp_path, QUIET, resume=False)
     assert compiled.count("jit(checked)") == 2  # one program starts the agents, one advances them
+    # Groups are joined on the host: on the devices that would be an exchange between them, which can stall.
+    assert "jit(concatenate)" not in compiled
 
 
 def test_the_reference_of_stacked_points_is_that_of_each_alone():
