@@ -12,14 +12,14 @@ import pytest
 from rich.console import Console
 
 import jrcjax
-from jrcjax import exact
+from jrcjax import exact, parallel
 from jrcjax.provenance import provenance
 from jrcjax.source import train_source
 from jrcjax.training import train
 from jrcjax.transfer import target_key
 from sweeps import store
 from sweeps.__main__ import main
-from sweeps.program import chunk_of, points_of, reference_of
+from sweeps.program import chunk_of, joined, points_of, reference_of
 from sweeps.registry import STUDIES, SWEEPS
 from sweeps.run import blocks, expected_seconds, run_sweep
 from sweeps.sources import SOURCE, missing_sources, sources_of
@@ -137,8 +137,18 @@ def test_the_program_is_compiled_once_for_all_blocks(tmp_path):
         # Three blocks, with a number of episodes that no other test uses, so that nothing is compiled yet.
         run_sweep(FIG5A, Size(seeds=2 * FIG5A.seeds_per_part + 1, episodes=3), tmp_path, QUIET, resume=False)
     assert compiled.count("jit(checked)") == 2  # one program starts the agents, one advances them
-    # Groups are joined on the host: on the devices that would be an exchange between them, which can stall.
-    assert "jit(concatenate)" not in compiled
+
+
+def test_groups_are_joined_on_the_host_since_an_exchange_between_devices_can_stall():
+    keys = jax.random.split(jax.random.key(0), 32)
+    agents = parallel.over_agents(lambda shared, agent: agent)(0, (keys, jnp.arange(32.0)))
+    assert len(agents[1].sharding.device_set) == 2
+    with compilations() as compiled:
+        joined_keys, numbers = joined([agents, agents])
+    assert not {"jit(concatenate)", "jit(checked)"} & set(compiled)
+    np.testing.assert_array_equal(numbers, np.tile(np.arange(32.0), 2))
+    assert joined_keys.dtype == keys.dtype
+    np.testing.assert_array_equal(jax.random.key_data(joined_keys)[32:], jax.random.key_data(keys))
 
 
 def test_the_reference_of_stacked_points_is_that_of_each_alone():
