@@ -1,6 +1,5 @@
 """A thousand malformed inputs, made by a seeded generator: each is refused by name before anything compiles."""
 
-import contextlib
 import dataclasses
 import os
 import random
@@ -10,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from rich.console import Console
+from test_checks import nothing_compiles
 
 import jrcjax
 from benchmarks.__main__ import main as benchmarks_main
@@ -26,22 +26,6 @@ JUNK = (None, "x", "", b"x", 1j, [], {}, (), object(), NAN, INF, -INF, [NAN], np
 NO_SIZES = (0, -1, 1.5, True, NAN, np.int64(5), np.float32(2), "3", 10**30, None, [], jnp.int32(4), 2**31)
 BAD_NUMBERS = (*JUNK, -1.0, -1e30, np.full(3, NAN), np.zeros((2, 2, 2)), np.full(2, -INF), "0.5")
 HUGE = 2**31 - 1
-
-
-@contextlib.contextmanager
-def nothing_compiles():
-    compiled = []
-
-    def listen(event, _, **__):
-        if "backend_compile" in event:
-            compiled.append(event)
-
-    jax.monitoring.register_event_duration_secs_listener(listen)
-    try:
-        yield
-    finally:
-        jax.monitoring.unregister_event_duration_listener(listen)
-    assert not compiled
 
 
 def leaves_of(params, prefix=""):
