@@ -10,7 +10,6 @@ import contextlib
 import dataclasses
 import json
 import os
-import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -23,6 +22,7 @@ from jrcjax import states
 from jrcjax.channel import Channel
 from jrcjax.checks import refuse, require_type
 from jrcjax.episodes import AgentState, spec_of
+from jrcjax.files import write_whole
 from jrcjax.hparams import Config, HParams
 from jrcjax.learners import LEARNERS, Spec
 from jrcjax.learners.q_function import q_function
@@ -240,19 +240,9 @@ def _chosen(field: str, value: Any, there: list[Any]) -> Any:
 
 
 def _write(path: Path, tensors: dict[str, np.ndarray], about: dict[str, Any]) -> Path:
-    """Writes a file under a temporary name, syncs it, and gives it its name."""
+    """Writes a file, whole or not at all."""
     from safetensors.numpy import save
 
     content = save({name: np.ascontiguousarray(array) for name, array in tensors.items()}, {ABOUT: json.dumps(about)})
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".", suffix=path.suffix)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        Path(temporary).chmod(0o644)
-        Path(temporary).replace(path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+    write_whole(path, content)
     return path

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from jrcjax.params import EnvParams
 from paper_figs import divergence
 from paper_figs.convergence import WINDOW, sample_complexity
 from paper_figs.statistics import mean_over_seeds
@@ -23,7 +24,7 @@ def table(data: xr.Dataset, figure: str) -> pd.DataFrame:
     `restricted_mean_episodes` say when policies are within 5 % of the optimum; `reached` is the share of seeds that
     ever are. Each number has its 95 % interval over seeds, but for the median.
     """
-    slots = int(data.attrs.get("slots", 300))
+    slots = EnvParams.max_steps_in_episode
     rows = []
     for point in range(data.sizes["point"]):
         for name in data["algorithm"].values:

@@ -19,11 +19,11 @@ import jax
 import numpy as np
 import xarray as xr
 
-from jrcjax import parallel
+from jrcjax import files, parallel
 from jrcjax.checks import refuse, require_integer
 from jrcjax.learners import Source
 from jrcjax.provenance import command
-from sweeps import files, sources, store
+from sweeps import sources, store
 from sweeps.program import points_of, reference_of
 from sweeps.run import results_of
 from sweeps.sweep import Size, Sweep

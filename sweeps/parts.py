@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from sweeps import files
+from jrcjax import files
 
 
 class Part(NamedTuple):

@@ -13,11 +13,12 @@ import xarray as xr
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from jrcjax import files
 from jrcjax.checks import refuse
 from jrcjax.episodes import AgentState, Log
 from jrcjax.learners import Source
 from jrcjax.provenance import usable_cores
-from sweeps import estimate, files, store
+from sweeps import estimate, store
 from sweeps.agents import check_agents, write_agents
 from sweeps.program import Points, Reference, points_of, reference_of, run_block
 from sweeps.sources import missing_sources, sources_of

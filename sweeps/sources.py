@@ -13,14 +13,14 @@ import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 
-from jrcjax import parallel
+from jrcjax import files, parallel
 from jrcjax.hparams import Config
 from jrcjax.learners import Source, Spec, make_learner
 from jrcjax.learners.q_function import q_function
 from jrcjax.n_step import NStepTransition
 from jrcjax.presets import paper_params
 from jrcjax.source import source_of
-from sweeps import files, store
+from sweeps import store
 from sweeps.estimate import seconds_per_episode
 from sweeps.parts import parts_of
 from sweeps.program import joined, keys_of, points_of, reference_of, run_block, spec_of_points

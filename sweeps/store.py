@@ -17,12 +17,12 @@ import jax
 import numpy as np
 import xarray as xr
 
+from jrcjax import files
 from jrcjax.episodes import Log
 from jrcjax.exact import LongRun
 from jrcjax.hparams import HParams
 from jrcjax.params import EnvParams
 from jrcjax.provenance import provenance
-from sweeps import files
 from sweeps.parts import Part, finished_seeds, part_path, parts_of, read_part, write_part
 from sweeps.program import Reference, points_of
 from sweeps.sweep import Size, Sweep

@@ -16,7 +16,8 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from sweeps import files, interrupts, parts, run, sources, store
+from jrcjax import files
+from sweeps import interrupts, parts, run, sources, store
 from sweeps.__main__ import main
 from sweeps.registry import EVERY_SWEEP, STUDIES, SWEEPS
 from sweeps.run import run_sweep
@@ -169,7 +170,7 @@ def test_a_second_run_says_that_the_folder_is_in_use(folder):
 
 
 def test_a_killed_process_leaves_neither_lock_nor_temporary_files(tmp_path):
-    code = "import pathlib, sys, time; from sweeps import files\nwith files.locked(pathlib.Path(sys.argv[1])): input()"
+    code = "import pathlib, sys, time; from jrcjax import files\nwith files.locked(pathlib.Path(sys.argv[1])): input()"
     process = subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], cwd=ROOT, stdin=subprocess.PIPE)
     while not (tmp_path / ".lock").exists() or not (tmp_path / ".lock").read_text():
         time.sleep(0.05)
