@@ -18,7 +18,7 @@ from jrcjax.checks import refuse
 from jrcjax.episodes import AgentState, Log
 from jrcjax.learners import Source
 from jrcjax.provenance import usable_cores
-from sweeps import estimate, store
+from sweeps import estimate, interrupts, store
 from sweeps.agents import check_agents, write_agents
 from sweeps.program import Points, Reference, points_of, reference_of, run_block
 from sweeps.sources import missing_sources, sources_of
@@ -121,7 +121,8 @@ def run_sweep(
                 _run_on_cluster(client, sweep, size, out, console)
         except (KeyboardInterrupt, OSError):
             saved = store.in_words(store.finished_seeds(folder))
-            console.print(f"{sweep.name}: stopped; saved in {folder}: {f'seeds {saved}' if saved else 'nothing yet'}")
+            held = f"seeds {saved}" if saved else "nothing yet"
+            console.print(f"{sweep.name}: stopped; saved in {folder}: {held}", soft_wrap=True)
             raise
     return folder
 
@@ -170,8 +171,10 @@ def _run_block(
     """Runs one block of seeds and writes its part; `advance` is told how many of the expected seconds are done."""
     source = sources_of(sweep.source, size, seeds, out, advance) if sweep.source else None
     folder = out / sweep.name
-    store.write_part(folder, seeds, results_of(sweep, size, points, reference, seeds, source, advance, keep))
-    store.write_manifest(folder)
+    results = results_of(sweep, size, points, reference, seeds, source, advance, keep)
+    with interrupts.held_off():
+        store.write_part(folder, seeds, results)
+        store.write_manifest(folder)
 
 
 def results_of(
