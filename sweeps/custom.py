@@ -93,6 +93,7 @@ def custom_sweep(options: Options, preset: str, taken: tuple[str, ...] = ()) -> 
         params_at=lambda x, preset: points[x].params,
         hparams_at=lambda x: points[x].hparams,
         source=_source(options.learners, base.params, preset),
+        recipe=replace(options, vary=f"{path}={','.join(map(parameter.text_of, values))}"),
     )
     return Custom(sweep, parameter, base.params.max_steps_in_episode)
 

@@ -70,6 +70,10 @@ class Parameter(NamedTuple):
             refuse(self.path, text, "an integer" if self.is_whole else "a finite number")
         return value
 
+    def text_of(self, value: float) -> str:
+        """What `value_of` takes for a value."""
+        return self.readings[int(value)] if self.readings else repr(value)
+
     def values_of(self, text: str) -> tuple[float, ...]:
         """The values that `text` stands for, ascending: a list a,b,c, or start:stop:count, or start:stop:count:log.
 

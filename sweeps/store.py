@@ -59,6 +59,8 @@ def configuration(sweep: Sweep, size: Size) -> dict[str, Any]:
         "hparams": {name: _plain(getattr(points.hparams, name)) for name in vars(HParams())},
         "config": {name: value for name, value in asdict(sweep.config(size)).items() if name != "episodes"},
     }
+    if sweep.recipe:
+        found["recipe"] = asdict(sweep.recipe)
     if sweep.source:
         found["source"] = configuration(sweep.source, size)
         found["source points"] = sweep.source_points

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 from jrcjax.checks import require_integer
 from jrcjax.hparams import Config, HParams
@@ -38,6 +39,8 @@ class Sweep:
     """Number of the source's point at each point; the first everywhere if empty."""
     optimiser: str = Config.optimiser  # pyright: ignore[reportAssignmentType]
     """One of jrcjax.hparams.OPTIMISERS, of the learners and of the source agents' sweep alike."""
+    recipe: Any = None
+    """What a sweep of one's own is made from (`sweeps.custom.Options`), so that its results can be verified."""
     seeds_per_part: int = 16
     """Seeds that share a part file. With few points more of them fill the blocks that devices work on."""
 
@@ -88,6 +91,8 @@ class Study:
     sweeps: tuple[Sweep, ...]
     size: Size = Size()
     """Unless the command line says otherwise."""
+    presets: tuple[str, ...] = PRESETS
+    """Tables of parameters that it can be run with."""
     smoke_sweeps: tuple[Sweep, ...] | None = None
     """What the tiny version runs instead of `sweeps`."""
     smoke_size: Size = SMOKE
@@ -95,7 +100,8 @@ class Study:
 
 def size_of(seeds: int | None, episodes: int | None, preset: str, smoke: bool, study: Study | None = None) -> Size:
     """The size that command-line options ask for."""
-    usual, tiny = (study.size, study.smoke_size) if study else (Size(), SMOKE)
+    usual, tiny, presets = (study.size, study.smoke_size, study.presets) if study else (Size(), SMOKE, PRESETS)
+    choice("preset", preset, presets)
     size = replace(tiny if smoke else usual, preset=preset)
     given = {"seeds": seeds, "episodes": episodes}
     return replace(size, **{name: value for name, value in given.items() if value is not None})

@@ -13,6 +13,7 @@ import xarray as xr
 from jrcjax import provenance
 from jrcjax.checks import refuse
 from sweeps import store
+from sweeps.custom import Options, custom_sweep
 from sweeps.parts import Part, parts_of, read_part
 from sweeps.program import points_of, reference_of
 from sweeps.run import results_of
@@ -126,12 +127,21 @@ def verify(folder: Path, number: int | None, sweeps: Mapping[str, Sweep]) -> lis
         refuse("folder", str(folder), "a folder with the parts of a sweep, such as out/results/fig6")
     results = []
     for part in sample_of(parts, number):
-        name = part.configuration["sweep"]
-        if name not in sweeps:
-            refuse(str(part.path), f"results of the sweep {name!r}", ", ".join(map(repr, sweeps)))
-        hands_on = any(other.source and other.source.name == name for other in sweeps.values())
-        results.append((part, differences(read_part(part.path), recomputed(part, sweeps[name], hands_on))))
+        sweep = _sweep_of(part, sweeps)
+        hands_on = any(other.source and other.source.name == sweep.name for other in sweeps.values())
+        results.append((part, differences(read_part(part.path), recomputed(part, sweep, hands_on))))
     return results
+
+
+def _sweep_of(part: Part, sweeps: Mapping[str, Sweep]) -> Sweep:
+    """Today's sweep of the name that a part gives, or what the part's recipe makes."""
+    if recipe := part.configuration.get("recipe"):
+        several = {name: tuple(recipe[name]) for name in ("set", "learners")}
+        return custom_sweep(Options(**(recipe | several)), part.configuration["preset"], tuple(sweeps)).sweep
+    name = part.configuration["sweep"]
+    if name not in sweeps:
+        refuse(str(part.path), f"results of the sweep {name!r}", ", ".join(map(repr, sweeps)))
+    return sweeps[name]
 
 
 def made_elsewhere(part: Part) -> list[str]:

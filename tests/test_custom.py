@@ -204,6 +204,8 @@ def test_one_command_runs_and_draws_it(capsys, tmp_path):
     assert drawn == pytest.approx(float(data["reward"].sel(algorithm="dpr").isel(point=1).mean()), rel=1e-5)
     for suffix in (".pdf", ".png"):
         assert (folder / f"own{suffix}").stat().st_size > 0
+    assert main(["verify", str(folder)]) == 0
+    assert "the same, bit for bit" in capsys.readouterr().out
     other = ["run", "custom", "--vary", "env.event_model=marginal,conditional", *size, "--resume"]
     assert main(other) == 2
     assert "holds results of another configuration" in capsys.readouterr().err

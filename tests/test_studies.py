@@ -247,6 +247,12 @@ def test_a_tiny_multiverse_judges_all_claims_as_the_figures_do(tmp_path):
     np.testing.assert_allclose(within["reward"], alone["reward"], rtol=1e-4)
 
 
+def test_a_multiverse_has_one_preset(tmp_path, capsys):
+    assert main(["run", "multiverse", "--preset", "paper_table", "--out", str(tmp_path)]) == 2
+    assert "preset: 'paper_table' is unknown; allowed: 'paper'\n" in capsys.readouterr().err
+    assert not any(tmp_path.iterdir())
+
+
 def test_points_of_a_multiverse_can_be_stacked():
     points = points_of(MULTIVERSE.smoke_sweeps[0], "paper")
     assert points.params.radar.miss_bank.shape[0] == 2 * len(POINTS)
