@@ -2,7 +2,7 @@
 
 A claim is a statement "effect <= limit" or "effect >= limit". With the whole interval on the claim's side of the limit
 it is supported, with the whole interval on the other side contradicted, and otherwise undecided at this number of
-seeds. The interval is a percentile bootstrap over seeds with a fixed generator.
+seeds. The interval is a symmetric bootstrap over seeds with a fixed generator (`paper_figs.statistics.bootstrap`).
 """
 
 from __future__ import annotations
@@ -61,12 +61,15 @@ def judge(
     figure: str,
     statistic: Statistic = lambda means: means,
     extreme: Callable[[np.ndarray], np.floating] | None = None,
+    least: float = -np.inf,
 ) -> Judgement:
     """Judges "effect <= limit", or >=, where the effect is a statistic of means over seeds of `values` [seeds, ...].
 
-    `extreme`, np.min or np.max, says which of several effects the claim is about.
+    `extreme`, np.min or np.max, says which of several effects the claim is about. No effect is below `least`, and
+    neither are intervals.
     """
     value, low, high = bootstrap(values, statistic, extreme)
+    low = float(np.maximum(low, least))  # of NaN and a number, NaN
     verdict = verdict_of(low, high, relation, limit)
     return Judgement(claim, statement, effect, relation, limit, value, low, high, verdict, len(values), figure)
 

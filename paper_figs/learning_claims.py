@@ -106,6 +106,7 @@ def target_claims(data: xr.Dataset) -> list[Judgement]:
                 2.0,
                 "5b",
                 lambda means: means[0] / means[1],
+                least=0.0,
             )
             for name, label in (("tlwd", "TLwD"), ("dpr", "DPR"))
         ),
@@ -118,6 +119,7 @@ def target_claims(data: xr.Dataset) -> list[Judgement]:
                 "<=",
                 120.0,
                 "5b",
+                least=1.0,
             )
             for name, label in (("tlwd", "TLwD"), ("dpr", "DPR"))
         ),

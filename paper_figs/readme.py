@@ -12,6 +12,7 @@ from pathlib import Path
 
 import jax
 import jax.numpy as jnp
+import pandas as pd
 import xarray as xr
 
 from jrcjax import exact, parallel
@@ -23,9 +24,13 @@ from paper_figs.claims import first
 from paper_figs.convergence import TOLERANCE, convergence_episode, gaps
 from paper_figs.figures import FIGURES
 from paper_figs.learning_claims import source_claims
+from paper_figs.statistics import CONFIDENCE
 from sweeps import store
 from sweeps.ablation import VARIANTS
 from sweeps.sweep import Size
+
+MULTIVERSE = Path(__file__).parent / "multiverse"
+"""Summary of a multiverse that the README rests on."""
 
 
 def claims_table(claims: list[dict], figure: str) -> str:
@@ -38,6 +43,30 @@ def claims_table(claims: list[dict], figure: str) -> str:
         criterion = f"{c['effect']} {c['relation']} {c['limit']:g}"
         measured = f"{c['value']:.3g} ({c['ci_low']:.3g} to {c['ci_high']:.3g})"
         rows.append((c["claim"], c["statement"], criterion, measured, c["verdict"]))
+    return "\n".join("| " + " | ".join(row) + " |" for row in rows)
+
+
+def standing(verdict: str, supported: float) -> str:
+    """Where a claim holds: by its verdict under the default readings, and the share of universes that support it.
+
+    A claim that is false everywhere is still supported in some 2.5 % of universes, so a share of up to 5 % is nowhere.
+    """
+    if verdict == "supported":
+        return "by default"
+    return "only under other readings" if supported > 1 - CONFIDENCE else "nowhere"
+
+
+def readings_table(claims: list[dict], shares: pd.DataFrame) -> str:
+    """Where each claim holds, as a Markdown table: the default verdicts, and those in the universes of a multiverse."""
+    head = ("claim", "by default", "supported", "contradicted", "undecided", "decided by", "holds")
+    rows = [head, ("---",) * len(head)]
+    by_claim = shares.set_index("claim")
+    for c in claims:
+        share = by_claim.loc[c["claim"]]
+        of_each = [f"{share[verdict]:.0%}" for verdict in ("supported", "contradicted", "undecided")]
+        deciding = "" if pd.isna(share["decided_by"]) else "; ".join(share["decided_by"].split("; ")[:2])
+        about = (deciding.replace("_", " "), standing(c["verdict"], share["supported"]))
+        rows.append((c["claim"], c["verdict"], *of_each, *about))
     return "\n".join("| " + " | ".join(row) + " |" for row in rows)
 
 
@@ -135,6 +164,8 @@ def main() -> int:
         return 2
     for figure in FIGURES:
         print(f"\n{figure.title}\n\n{claims_table(claims, figure.name.removeprefix('fig'))}")
+    if (MULTIVERSE / "claims.csv").exists():
+        print(f"\nunder other readings\n\n{readings_table(claims, pd.read_csv(MULTIVERSE / 'claims.csv'))}")
     sections = {"in the source": quoted_of_source(source), "in the target": quoted_of_target(target)}
     if (folder / "ablation").exists():
         sections["TLwD with parts left out"] = quoted_of_ablation(store.load(folder / "ablation", Size().seeds))

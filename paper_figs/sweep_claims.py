@@ -100,6 +100,7 @@ def speed_claims(data: xr.Dataset) -> list[Judgement]:
             ">=",
             300.0,
             "6a",
+            least=1.0,
         ),
         *(
             judge(
@@ -110,6 +111,7 @@ def speed_claims(data: xr.Dataset) -> list[Judgement]:
                 "<=",
                 200.0,
                 "6a",
+                least=1.0,
             )
             for name in ("tlwd", "dpr")
         ),

@@ -2,13 +2,14 @@
 
 Workers compute and never write, so they need no folder in common. A task whose worker is lost runs again on another
 one, and since a seed has the same bits wherever it runs, results are those of a local run. A worker uses all of its
-devices: it shards its agents over them like any other process.
+devices: it shards its agents over them like any other process. Workers of a local cluster share its cores.
 """
 
 from __future__ import annotations
 
 import functools
 import json
+import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -84,21 +85,20 @@ def run_blocks(client: Any, sweep: Sweep, size: Size, out: Path, todo: list[rang
     from distributed import as_completed
 
     blocks = {}
+    share_of = len(client.cluster.workers) if client.cluster else None  # those of this machine share its cores
     for seeds in todo:
         source = None
         if sweep.source and not sources.missing_sources(sweep.source, size, seeds, out):
             kept = sources.sources_of(sweep.source, size, seeds, out, lambda seconds: None)
             source = client.scatter(jax.tree.map(np.asarray, kept))
-        blocks[client.submit(_block, sweep, size, seeds, source, pure=False)] = seeds
+        blocks[client.submit(_block, sweep, size, seeds, source, share_of, pure=False)] = seeds
     for done in as_completed(list(blocks), loop=client.loop):
         seeds, (trained, results) = blocks[done], done.result()
         if sweep.source and trained is not None:
             folder = out / sweep.source.name
             with files.locked(folder, waiting=lambda held: None):
-                store.write_part(folder, seeds, _as_commanded(trained))
-                store.write_manifest(folder)
-        store.write_part(out / sweep.name, seeds, _as_commanded(results))
-        store.write_manifest(out / sweep.name)
+                store.add_part(folder, seeds, _as_commanded(trained))
+        store.add_part(out / sweep.name, seeds, _as_commanded(results))
         done.release()
         yield seeds
 
@@ -109,9 +109,11 @@ def _as_commanded(data: xr.Dataset) -> xr.Dataset:
     return data.assign_attrs(provenance=json.dumps(made, sort_keys=True))
 
 
-def _block(sweep: Sweep, size: Size, seeds: range, source: Source | None) -> tuple[xr.Dataset | None, xr.Dataset]:
+def _block(
+    sweep: Sweep, size: Size, seeds: range, source: Source | None, share_of: int | None
+) -> tuple[xr.Dataset | None, xr.Dataset]:
     """On a worker: the results of a block of seeds, and of the source agents that it had to train."""
-    _prepare()
+    _prepare(share_of)
     trained = None
     if sweep.source and source is None:
         source, trained = sources.trained(sweep.source, size, seeds, lambda seconds: None)
@@ -120,8 +122,17 @@ def _block(sweep: Sweep, size: Size, seeds: range, source: Source | None) -> tup
     return trained, results_of(sweep, size, points, reference, seeds, source, lambda seconds: None)
 
 
+def share(cores: list[int], number: int, of: int) -> list[int]:
+    """The cores of worker `number` of so many: each core has one worker, or each worker one core."""
+    return cores[number % of :: of] or [cores[number % len(cores)]]
+
+
 @functools.cache
-def _prepare() -> None:
+def _prepare(share_of: int | None) -> None:
     """Makes a worker's process what the command line makes its own, once, before it has any array."""
+    if share_of and hasattr(os, "sched_setaffinity"):
+        from distributed import get_worker
+
+        os.sched_setaffinity(0, share(sorted(os.sched_getaffinity(0)), int(get_worker().name), share_of))
     parallel.use_all_cores()
     parallel.keep_compiled()

@@ -18,7 +18,7 @@ from jrcjax.checks import refuse
 from jrcjax.episodes import AgentState, Log
 from jrcjax.learners import Source
 from jrcjax.provenance import usable_cores
-from sweeps import estimate, interrupts, store
+from sweeps import estimate, store
 from sweeps.agents import check_agents, write_agents
 from sweeps.program import Points, Reference, points_of, reference_of, run_block
 from sweeps.sources import missing_sources, sources_of
@@ -171,10 +171,7 @@ def _run_block(
     """Runs one block of seeds and writes its part; `advance` is told how many of the expected seconds are done."""
     source = sources_of(sweep.source, size, seeds, out, advance) if sweep.source else None
     folder = out / sweep.name
-    results = results_of(sweep, size, points, reference, seeds, source, advance, keep)
-    with interrupts.held_off():
-        store.write_part(folder, seeds, results)
-        store.write_manifest(folder)
+    store.add_part(folder, seeds, results_of(sweep, size, points, reference, seeds, source, advance, keep))
 
 
 def results_of(

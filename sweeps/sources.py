@@ -69,8 +69,7 @@ def sources_of(source: Sweep, size: Size, seeds: range, out: Path, advance: Call
         # Sweeps that run at the same time share the folder: one trains, the others wait for its agents.
         with files.locked(folder, lambda held: print(f"{held}; waiting for its agents", file=sys.stderr)):
             if missing := missing_sources(source, size, seeds, out):
-                store.write_part(folder, missing, trained(source, size, missing, advance)[1])
-            store.write_manifest(folder)
+                store.add_part(folder, missing, trained(source, size, missing, advance)[1])
     return _load(source, size, seeds, folder)
 
 

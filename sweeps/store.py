@@ -23,13 +23,14 @@ from jrcjax.exact import LongRun
 from jrcjax.hparams import HParams
 from jrcjax.params import EnvParams
 from jrcjax.provenance import provenance
+from sweeps import interrupts
 from sweeps.parts import Part, finished_seeds, part_path, parts_of, read_part, write_part
 from sweeps.program import Reference, points_of
 from sweeps.sweep import Size, Sweep
 
 __all__ = [
-    "MANIFEST", "ConfigurationMismatch", "check_configuration", "check_folder", "configuration", "dataset", "digest_of",
-    "finished_seeds", "load", "part_path", "write_manifest", "write_part",
+    "MANIFEST", "ConfigurationMismatch", "add_part", "check_configuration", "check_folder", "configuration", "dataset",
+    "digest_of", "finished_seeds", "load", "part_path", "write_manifest", "write_part",
 ]  # fmt: skip
 
 MANIFEST = "manifest.json"
@@ -137,6 +138,17 @@ def dataset(sweep: Sweep, size: Size, seeds: range, log: dict[str, Log], exact: 
     }
     about = {"configuration": configuration(sweep, size), "provenance": provenance()}
     return xr.Dataset(variables, coords, {name: json.dumps(value, sort_keys=True) for name, value in about.items()})
+
+
+def add_part(folder: Path, seeds: range, data: xr.Dataset) -> None:
+    """Writes one part and the manifest with it; an interrupt waits until both are there.
+
+    Raises:
+      OSError: naming the file, for instance when the disk is full.
+    """
+    with interrupts.held_off():
+        write_part(folder, seeds, data)
+        write_manifest(folder)
 
 
 def write_manifest(folder: Path) -> None:

@@ -1,14 +1,17 @@
 """A sweep on a local Dask cluster gives the bits of a local run, also when it loses a worker."""
 
+import shutil
 import subprocess
 import sys
 import time
 from pathlib import Path
 
 import pytest
+import xarray as xr
 
-from sweeps import parts
+from sweeps import parts, store
 from sweeps.__main__ import main
+from sweeps.distributed import share
 
 ROOT = Path(__file__).parents[1]
 ARGUMENTS = ["run", "fig5a", "--episodes", "2", "--seeds", "160"]
@@ -33,6 +36,34 @@ def test_a_cluster_that_loses_a_worker_gives_the_results_of_a_local_run(tmp_path
     assert all("sweeps run fig5a" in part.provenance["command"] for part in parts.parts_of(tmp_path / "dask" / "fig5a"))
     local, dask = (parts.parts_of(tmp_path / name / "fig5a") for name in ("local", "dask"))
     assert [(part.path.name, part.digest) for part in dask] == [(part.path.name, part.digest) for part in local]
+
+
+@pytest.mark.slow
+def test_a_sweep_that_transfers_runs_on_a_scheduler_that_is_there(tmp_path):
+    distributed = pytest.importorskip("distributed", reason="the extra dask is not installed")
+    transfer = ["run", "fig9", "--smoke", "--episodes", "2"]
+    assert main([*transfer, "--out", str(tmp_path / "local")]) == 0
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0") as cluster:
+        there = ["--scheduler", cluster.scheduler_address, "--out", str(tmp_path / "dask")]
+        assert main([*transfer, *there, "--seeds", "1"]) == 0  # trains its source agents there
+        assert main([*transfer, *there, "--resume"]) == 0
+        shutil.rmtree(tmp_path / "dask" / "fig9")
+        assert main([*transfer, *there]) == 0  # sends source agents there
+    for name in ("fig9", "source"):
+        local, dask = (store.load(tmp_path / where / name, 2) for where in ("local", "dask"))
+        xr.testing.assert_equal(local, dask)
+
+
+@pytest.mark.parametrize(
+    ("cores", "of", "shares"),
+    [
+        ([0, 1, 2, 3, 4], 2, [[0, 2, 4], [1, 3]]),
+        ([2, 5], 2, [[2], [5]]),
+        ([2, 5], 3, [[2], [5], [2]]),
+    ],
+)
+def test_workers_of_one_machine_share_its_cores(cores, of, shares):
+    assert [share(cores, number, of) for number in range(of)] == shares
 
 
 @pytest.mark.parametrize(
