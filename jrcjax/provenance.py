@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.metadata
 import os
 import platform
 import shlex
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextvars import ContextVar
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 _PACKAGES = ("jrcjax", "jax", "jaxlib", "flax", "optax", "chex", "distrax", "numpy", "scipy", "xarray")
+_WORKS_FOR: ContextVar[str | None] = ContextVar("_WORKS_FOR", default=None)
 _VECTOR_FLAGS = ("avx", "fma", "f16c", "amx", "asimd", "sve")
 
 
@@ -64,8 +68,18 @@ def _cpuinfo(field: str) -> str:
 
 
 def command() -> str:
-    """The command that this process was started with."""
-    return shlex.join(["python", *sys.orig_argv[1:]])
+    """The command that this process, or the one that it works for, was started with."""
+    return _WORKS_FOR.get() or shlex.join(["python", *sys.orig_argv[1:]])
+
+
+@contextlib.contextmanager
+def working_for(command: str) -> Iterator[None]:
+    """What is made meanwhile is made by this command of another process."""
+    before = _WORKS_FOR.set(command)
+    try:
+        yield
+    finally:
+        _WORKS_FOR.reset(before)
 
 
 def provenance() -> dict[str, Any]:

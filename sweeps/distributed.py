@@ -8,13 +8,13 @@ devices: it shards its agents over them like any other process. Workers of a loc
 from __future__ import annotations
 
 import functools
-import json
 import os
 import re
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -23,8 +23,9 @@ import xarray as xr
 from jrcjax import files, parallel
 from jrcjax.checks import refuse, require_integer
 from jrcjax.learners import Source
-from jrcjax.provenance import command
+from jrcjax.provenance import command, working_for
 from sweeps import sources, store
+from sweeps.agents import agents_path, write_agents
 from sweeps.program import points_of, reference_of
 from sweeps.run import results_of
 from sweeps.sweep import Size, Sweep
@@ -69,7 +70,9 @@ def client_of(scheduler: str | None, workers: int | None) -> Iterator[Any]:
         yield client
 
 
-def run_blocks(client: Any, sweep: Sweep, size: Size, out: Path, todo: list[range]) -> Iterator[range]:
+def run_blocks(
+    client: Any, sweep: Sweep, size: Size, out: Path, todo: list[range], save_agents: bool = False
+) -> Iterator[range]:
     """Runs blocks of seeds on a cluster and writes their parts, and those of source agents, as they come in.
 
     Args:
@@ -78,6 +81,7 @@ def run_blocks(client: Any, sweep: Sweep, size: Size, out: Path, todo: list[rang
       size: how much of it.
       out: the folder with the results of all sweeps.
       todo: the blocks.
+      save_agents: save the trained agents beside the parts.
 
     Yields:
       Each block, when its part is written.
@@ -89,37 +93,63 @@ def run_blocks(client: Any, sweep: Sweep, size: Size, out: Path, todo: list[rang
     for seeds in todo:
         source = None
         if sweep.source and not sources.missing_sources(sweep.source, size, seeds, out):
-            kept = sources.sources_of(sweep.source, size, seeds, out, lambda seconds: None)
+            kept = sources.sources_of(sweep.source, size, seeds, out, _quiet)
             source = client.scatter(jax.tree.map(np.asarray, kept))
-        blocks[client.submit(_block, sweep, size, seeds, source, share_of, pure=False)] = seeds
+        asked = _Asked(sweep, size, seeds, save_agents, share_of, command())
+        blocks[client.submit(_block, asked, source, pure=False)] = seeds
     for done in as_completed(list(blocks), loop=client.loop):
-        seeds, (trained, results) = blocks[done], done.result()
-        if sweep.source and trained is not None:
+        seeds, made = blocks[done], done.result()
+        if sweep.source and made.sources is not None:
             folder = out / sweep.source.name
             with files.locked(folder, waiting=lambda held: None):
-                store.add_part(folder, seeds, _as_commanded(trained))
-        store.add_part(out / sweep.name, seeds, _as_commanded(results))
+                store.add_part(folder, seeds, made.sources)
+        if made.agents is not None:
+            files.write_whole(agents_path(out / sweep.name, seeds), made.agents)
+        store.add_part(out / sweep.name, seeds, made.results)
         done.release()
         yield seeds
 
 
-def _as_commanded(data: xr.Dataset) -> xr.Dataset:
-    """A worker's results with the command of this process, since a worker's own says nothing."""
-    made = json.loads(data.attrs["provenance"]) | {"command": command()}
-    return data.assign_attrs(provenance=json.dumps(made, sort_keys=True))
+class _Asked(NamedTuple):
+    """What a worker is asked for."""
+
+    sweep: Sweep
+    size: Size
+    seeds: range
+    save_agents: bool
+    share_of: int | None
+    """Workers that share the cores of its machine; None if it has them for itself."""
+    command: str
+    """Of the process that asks."""
 
 
-def _block(
-    sweep: Sweep, size: Size, seeds: range, source: Source | None, share_of: int | None
-) -> tuple[xr.Dataset | None, xr.Dataset]:
-    """On a worker: the results of a block of seeds, and of the source agents that it had to train."""
-    _prepare(share_of)
-    trained = None
-    if sweep.source and source is None:
-        source, trained = sources.trained(sweep.source, size, seeds, lambda seconds: None)
-    points = points_of(sweep, size.preset)
-    reference = reference_of(points, size.episodes)
-    return trained, results_of(sweep, size, points, reference, seeds, source, lambda seconds: None)
+class _Made(NamedTuple):
+    """What a worker returns."""
+
+    results: xr.Dataset
+    sources: xr.Dataset | None
+    """Results of the source agents, if it had to train them."""
+    agents: bytes | None
+    """The file of the agents, if it was asked for."""
+
+
+def _block(asked: _Asked, source: Source | None) -> _Made:
+    """On a worker: the results of a block of seeds."""
+    _prepare(asked.share_of)
+    sweep, size, seeds, trained = asked.sweep, asked.size, asked.seeds, None
+    with working_for(asked.command), tempfile.TemporaryDirectory() as scratch:
+        if sweep.source and source is None:
+            source, trained = sources.trained(sweep.source, size, seeds, _quiet)
+        points = points_of(sweep, size.preset)
+        reference = reference_of(points, size.episodes)
+        keep = functools.partial(write_agents, Path(scratch), sweep, size, points, seeds) if asked.save_agents else None
+        results = results_of(sweep, size, points, reference, seeds, source, _quiet, keep)
+        saved = agents_path(Path(scratch), seeds).read_bytes() if keep else None
+    return _Made(results, trained, saved)
+
+
+def _quiet(seconds: float) -> None:
+    """Shows no progress."""
 
 
 def share(cores: list[int], number: int, of: int) -> list[int]:

@@ -14,7 +14,6 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from jrcjax import files
-from jrcjax.checks import refuse
 from jrcjax.episodes import AgentState, Log
 from jrcjax.learners import Source
 from jrcjax.provenance import usable_cores
@@ -104,8 +103,6 @@ def run_sweep(
     if finished and not resume:
         raise ValueError(f"{folder} holds results of {finished} seeds already; add --resume, or choose another --out")
     if save_agents:
-        if client is not None:
-            refuse("save-agents", "with a cluster", "a run without --scheduler and --workers")
         check_agents(folder, sweep)
     if not todo:
         console.print(f"{sweep.name}: all {size.seeds} seeds are there, in {folder}")
@@ -118,7 +115,7 @@ def run_sweep(
             if client is None:
                 _run_blocks(sweep, size, out, console, seconds, save_agents)
             else:
-                _run_on_cluster(client, sweep, size, out, console)
+                _run_on_cluster(client, sweep, size, out, console, save_agents)
         except (KeyboardInterrupt, OSError):
             saved = store.in_words(store.finished_seeds(folder))
             held = f"seeds {saved}" if saved else "nothing yet"
@@ -139,14 +136,14 @@ def _run_blocks(sweep: Sweep, size: Size, out: Path, console: Console, seconds: 
             _run_block(sweep, size, points, reference, seeds, out, told, keep if save_agents else None)
 
 
-def _run_on_cluster(client: Any, sweep: Sweep, size: Size, out: Path, console: Console) -> None:
+def _run_on_cluster(client: Any, sweep: Sweep, size: Size, out: Path, console: Console, save_agents: bool) -> None:
     """The same on a cluster; the progress counts seeds, over all workers."""
     from sweeps import distributed  # which builds upon this module
 
     todo = to_do(sweep, size, out)
     with Progress(*_COLUMNS, console=console) as progress:
         task = progress.add_task(f"{sweep.name} on a cluster", total=sum(map(len, todo)))
-        for seeds in distributed.run_blocks(client, sweep, size, out, todo):
+        for seeds in distributed.run_blocks(client, sweep, size, out, todo, save_agents):
             progress.advance(task, len(seeds))
 
 

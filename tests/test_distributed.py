@@ -6,11 +6,14 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 import xarray as xr
 
+from jrcjax import load_agent
 from sweeps import parts, store
 from sweeps.__main__ import main
+from sweeps.agents import agents_path
 from sweeps.distributed import share
 
 ROOT = Path(__file__).parents[1]
@@ -41,7 +44,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_results_of_a_local_run(tmp_path
 @pytest.mark.slow
 def test_a_sweep_that_transfers_runs_on_a_scheduler_that_is_there(tmp_path):
     distributed = pytest.importorskip("distributed", reason="the extra dask is not installed")
-    transfer = ["run", "fig9", "--smoke", "--episodes", "2"]
+    transfer = ["run", "fig9", "--smoke", "--episodes", "2", "--save-agents"]
     assert main([*transfer, "--out", str(tmp_path / "local")]) == 0
     with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0") as cluster:
         there = ["--scheduler", cluster.scheduler_address, "--out", str(tmp_path / "dask")]
@@ -49,6 +52,10 @@ def test_a_sweep_that_transfers_runs_on_a_scheduler_that_is_there(tmp_path):
         assert main([*transfer, *there, "--resume"]) == 0
         shutil.rmtree(tmp_path / "dask" / "fig9")
         assert main([*transfer, *there]) == 0  # sends source agents there
+    which = {"learner": "tlwd", "point": 1, "seed": 1}
+    here, back = (load_agent(agents_path(tmp_path / where / "fig9", range(2)), **which) for where in ("local", "dask"))
+    np.testing.assert_array_equal(here.policy(), back.policy())
+    assert here.provenance["command"] == back.provenance["command"]  # of this process, not of the worker
     for name in ("fig9", "source"):
         local, dask = (store.load(tmp_path / where / name, 2) for where in ("local", "dask"))
         xr.testing.assert_equal(local, dask)
