@@ -27,7 +27,7 @@ from jrcjax.provenance import command, working_for
 from sweeps import sources, store
 from sweeps.agents import agents_path, write_agents
 from sweeps.program import points_of, reference_of
-from sweeps.run import results_of
+from sweeps.run import quiet, results_of
 from sweeps.sweep import Size, Sweep
 
 _LOST_WORKERS = 10  # that one block may have before the run gives up
@@ -93,7 +93,7 @@ def run_blocks(
     for seeds in todo:
         source = None
         if sweep.source and not sources.missing_sources(sweep.source, size, seeds, out):
-            kept = sources.sources_of(sweep.source, size, seeds, out, _quiet)
+            kept = sources.sources_of(sweep.source, size, seeds, out, quiet)
             source = client.scatter(jax.tree.map(np.asarray, kept))
         asked = _Asked(sweep, size, seeds, save_agents, share_of, command())
         blocks[client.submit(_block, asked, source, pure=False)] = seeds
@@ -139,17 +139,13 @@ def _block(asked: _Asked, source: Source | None) -> _Made:
     sweep, size, seeds, trained = asked.sweep, asked.size, asked.seeds, None
     with working_for(asked.command), tempfile.TemporaryDirectory() as scratch:
         if sweep.source and source is None:
-            source, trained = sources.trained(sweep.source, size, seeds, _quiet)
+            source, trained = sources.trained(sweep.source, size, seeds, quiet)
         points = points_of(sweep, size.preset)
         reference = reference_of(points, size.episodes)
         keep = functools.partial(write_agents, Path(scratch), sweep, size, points, seeds) if asked.save_agents else None
-        results = results_of(sweep, size, points, reference, seeds, source, _quiet, keep)
+        results = results_of(sweep, size, points, reference, seeds, source, quiet, keep)
         saved = agents_path(Path(scratch), seeds).read_bytes() if keep else None
     return _Made(results, trained, saved)
-
-
-def _quiet(seconds: float) -> None:
-    """Shows no progress."""
 
 
 def share(cores: list[int], number: int, of: int) -> list[int]:

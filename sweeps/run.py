@@ -171,6 +171,10 @@ def _run_block(
     store.add_part(folder, seeds, results_of(sweep, size, points, reference, seeds, source, advance, keep))
 
 
+def quiet(seconds: float) -> None:
+    """An `advance` that shows no progress."""
+
+
 def results_of(
     sweep: Sweep,
     size: Size,

@@ -16,7 +16,7 @@ from sweeps import store
 from sweeps.custom import Options, custom_sweep
 from sweeps.parts import Part, parts_of, read_part
 from sweeps.program import points_of, reference_of
-from sweeps.run import results_of
+from sweeps.run import quiet, results_of
 from sweeps.sources import trained
 from sweeps.sweep import Size, Sweep
 
@@ -74,15 +74,11 @@ def recomputed(part: Part, sweep: Sweep, hands_on: bool) -> xr.Dataset:
     size = size_of_part(part)
     store.check_configuration(part, store.configuration(sweep, size))
     if hands_on:
-        return trained(sweep, size, part.seeds, _quiet)[1]
-    source = trained(sweep.source, size, part.seeds, _quiet)[0] if sweep.source else None
+        return trained(sweep, size, part.seeds, quiet)[1]
+    source = trained(sweep.source, size, part.seeds, quiet)[0] if sweep.source else None
     points = points_of(sweep, size.preset)
     reference = reference_of(points, size.episodes)
-    return results_of(sweep, size, points, reference, part.seeds, source, _quiet)
-
-
-def _quiet(seconds: float) -> None:
-    """Shows no progress."""
+    return results_of(sweep, size, points, reference, part.seeds, source, quiet)
 
 
 def differences(there: xr.Dataset, again: xr.Dataset) -> list[Difference]:
