@@ -117,12 +117,16 @@ def main_effects(found: pd.DataFrame) -> pd.DataFrame:
 
 
 def shares(found: pd.DataFrame, effects: pd.DataFrame) -> pd.DataFrame:
-    """One row per claim: the share of universes with each verdict, the verdict in the first, and what decides it."""
+    """One row per claim: the share of universes with each verdict, the verdict in the first, and what decides it.
+
+    `decided_by` lists the readings whose range is above chance (see `main_effects`), the largest first, with the range.
+    """
     rows = []
     for claim, of_claim in found.groupby("claim", sort=False):
         deciding = effects.query(f"claim == {claim!r} and range > chance").drop_duplicates("reading")
         ranges = deciding.sort_values("range", ascending=False)
-        row: dict[str, Any] = {"claim": claim, "universes": len(of_claim)}
+        about = of_claim.iloc[0][["claim", "relation", "limit"]].to_dict()
+        row: dict[str, Any] = about | {"universes": len(of_claim)}
         row |= {verdict: float((of_claim.verdict == verdict).mean()) for verdict in VERDICTS}
         row["holds"] = float(of_claim.holds.mean())
         row["default"] = of_claim.loc[of_claim.universe == 0, "verdict"].item()

@@ -10,7 +10,7 @@ import pandas as pd
 
 from paper_figs import multiverse, robustness, style
 from sweeps import store
-from sweeps.multiverse import MULTIVERSE, UNIVERSES, grouped
+from sweeps.multiverse import LEVELS, MULTIVERSE, UNIVERSES, grouped
 from sweeps.robustness import SOURCE, TARGET
 from sweeps.sweep import Size, Sweep
 
@@ -56,7 +56,12 @@ def summarise_multiverse(sweeps: tuple[Sweep, ...], size: Size, out: Path) -> li
     found = multiverse.verdicts(results, universes)
     effects = multiverse.main_effects(found)
     shares = multiverse.shares(found, effects)
-    tables = {"verdicts": found, "main_effects": effects, "claims": shares}
+    tables = {
+        "universes": found[["universe", *LEVELS]].drop_duplicates(),
+        "verdicts": found.drop(columns=[*LEVELS, "relation", "limit"]),
+        "main_effects": effects,
+        "claims": shares,
+    }
     pictures = style.save(multiverse.draw_shares(shares, size.seeds), folder / "multiverse")
     pictures += style.save(multiverse.draw_specification(found, HEADLINE), folder / "specification")
     pages = (multiverse.draw_specification(found, claim) for claim in shares.claim)

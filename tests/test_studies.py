@@ -239,6 +239,9 @@ def test_a_tiny_multiverse_judges_all_claims_as_the_figures_do(tmp_path):
     assert main(["run", "multiverse", "--smoke", "--episodes", "2", "--out", str(tmp_path)]) == 0
     found = pd.read_csv(tmp_path / "multiverse" / "summary" / "verdicts.csv")
     assert set(found.universe) == {0, 1}
+    universes = pd.read_csv(tmp_path / "multiverse" / "summary" / "universes.csv")
+    assert list(universes.columns) == ["universe", *LEVELS]
+    assert list(universes.universe) == [0, 1]
     assert {claim.split()[0] for claim in found.claim} == {f"C{number}" for number in range(1, 16)}
     # The default universe is the figure, seed by seed.
     size = replace(SMOKE, episodes=2)
