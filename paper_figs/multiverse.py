@@ -139,7 +139,10 @@ def shares(found: pd.DataFrame, effects: pd.DataFrame) -> pd.DataFrame:
 
 @style.styled
 def draw_shares(table: pd.DataFrame, n_seeds: int) -> Figure:
-    """Each claim's verdicts over the universes, the default reading's marked, with the reading that decides most."""
+    """Each claim's verdicts over the universes, the default reading's marked, with the reading that decides most.
+
+    A tick shows the share of universes in which the estimate, whatever its interval, is on the claim's side.
+    """
     figure = Figure(figsize=(style.TWO_COLUMNS[0], 0.155 * len(table) + 0.9))
     axes = figure.subplots()
     left = np.zeros(len(table))
@@ -155,6 +158,8 @@ def draw_shares(table: pd.DataFrame, n_seeds: int) -> Figure:
         axes.plot((left + width / 2)[chosen], rows[chosen], "k", marker="D", linestyle="", markersize=2.5)
         left += width
     axes.plot([], [], "k", marker="D", linestyle="", markersize=2.5, label="default readings")
+    tick = {"marker": "|", "linestyle": "", "markersize": 7, "markeredgewidth": 1.2}
+    axes.plot(100 * table["holds"], rows, "k", **tick, label="estimate holds up to here")
     axes.set_yticks(rows, table.claim, fontsize=6)
     for row, text in zip(rows, table.decided_by, strict=True):
         axes.text(101, row, text.split(";")[0].replace("_", " "), fontsize=5.5, va="center")
@@ -165,7 +170,7 @@ def draw_shares(table: pd.DataFrame, n_seeds: int) -> Figure:
         f"Verdicts in {table.universes.max()} universes of {n_seeds} seeds; right: the reading that decides most"
     )
     axes.grid(visible=False)
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=5)
     return figure
 
 

@@ -58,12 +58,12 @@ def standing(verdict: str, supported: float) -> str:
 
 def readings_table(claims: list[dict], shares: pd.DataFrame) -> str:
     """Where each claim holds, as a Markdown table: the default verdicts, and those in the universes of a multiverse."""
-    head = ("claim", "by default", "supported", "contradicted", "undecided", "decided by", "holds")
+    head = ("claim", "by default", "supported", "contradicted", "undecided", "estimate holds", "decided by", "holds")
     rows = [head, ("---",) * len(head)]
     by_claim = shares.set_index("claim")
     for c in claims:
         share = by_claim.loc[c["claim"]]
-        of_each = [f"{share[verdict]:.0%}" for verdict in ("supported", "contradicted", "undecided")]
+        of_each = [f"{share[part]:.0%}" for part in ("supported", "contradicted", "undecided", "holds")]
         deciding = "" if pd.isna(share["decided_by"]) else "; ".join(share["decided_by"].split("; ")[:2])
         about = (deciding.replace("_", " "), standing(c["verdict"], share["supported"]))
         rows.append((c["claim"], c["verdict"], *of_each, *about))
