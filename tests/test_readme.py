@@ -4,8 +4,12 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
+import pytest
+
 from paper_figs.figures import FIGURES
-from paper_figs.readme import claims_table
+from paper_figs.readme import MULTIVERSE, claims_table, readings_table, standing
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text()
@@ -33,6 +37,26 @@ def test_every_claim_is_in_one_of_the_tables():
     claims = json.loads((ROOT / "paper_figs" / "reference" / "claims.json").read_text())
     tables = [claims_table(claims, figure.name.removeprefix("fig")) for figure in FIGURES]
     assert sum(table.count("\n") - 1 for table in tables) == len(claims)
+
+
+def test_table_of_readings_is_that_of_the_committed_multiverse():
+    claims = json.loads((ROOT / "paper_figs" / "reference" / "claims.json").read_text())
+    shares = pd.read_csv(MULTIVERSE / "claims.csv")
+    assert readings_table(claims, shares) in RESULTS
+    np.testing.assert_allclose(shares[["supported", "undecided", "contradicted"]].sum(axis=1), 1, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("verdict", "supported", "where"),
+    [
+        ("supported", 0.0, "by default"),
+        ("undecided", 0.5, "only under other readings"),
+        ("contradicted", 0.06, "only under other readings"),
+        ("undecided", 0.04, "nowhere"),
+    ],
+)
+def test_where_a_claim_holds(verdict, supported, where):
+    assert standing(verdict, supported) == where
 
 
 def test_every_path_exists():
