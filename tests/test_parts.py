@@ -1,6 +1,7 @@
 """Results on disk under damage, kills, full disks and two runs at once: nothing lost, nothing silent."""
 
 import errno
+import functools
 import json
 import os
 import shlex
@@ -400,7 +401,9 @@ def test_a_request_to_end_interrupts_too():
     assert signal.getsignal(signal.SIGTERM) is before
 
 
-def test_an_interrupt_waits_for_what_is_begun():
+def test_an_interrupt_waits_for_what_is_begun(request):
+    request.addfinalizer(functools.partial(signal.signal, signal.SIGINT, signal.getsignal(signal.SIGINT)))
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # which a test run in the background ignores
     before = signal.getsignal(signal.SIGTERM), signal.getsignal(signal.SIGINT)
     done = []
 
