@@ -49,7 +49,7 @@ def claims_table(claims: list[dict], figure: str) -> str:
 def standing(verdict: str, supported: float) -> str:
     """Where a claim holds: by its verdict under the default readings, and the share of universes that support it.
 
-    A claim that is false everywhere is still supported in some 2.5 % of universes, so a share of up to 5 % is nowhere.
+    By chance alone a false claim is supported in up to 2.5 % of universes, so a share of up to 5 % is nowhere.
     """
     if verdict == "supported":
         return "by default"
