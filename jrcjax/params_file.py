@@ -120,7 +120,25 @@ def save_params(path: str | Path, params: EnvParams) -> None:
 
 def from_toml(text: str) -> EnvParams:
     """The environment that the text of a file describes; see `load_params`."""
-    given = _checked(tomllib.loads(text))
+    return params_of(description_of(text))
+
+
+def description_of(text: str) -> dict[str, Any]:
+    """What the text of a file says, key by key and table by table.
+
+    Raises:
+      ValueError: for keys that are unknown and values of the wrong kind, naming them and what is allowed.
+    """
+    return _checked(tomllib.loads(text))
+
+
+def params_of(description: dict[str, Any]) -> EnvParams:
+    """The environment that a description (see `description_of`) is of.
+
+    Raises:
+      ValueError: naming the field, the value and what is allowed.
+    """
+    given = dict(description)
     base = {name: given.pop(name) for name in _BASE if name in given}
     paper = paper_params(**base) if base else None
     radar = paper.radar if paper and "radar" not in given else None  # with its bank, which takes seconds to build
@@ -150,13 +168,17 @@ def from_toml(text: str) -> EnvParams:
 def to_toml(params: EnvParams) -> str:
     """The text of a file that describes `params` without reference to a preset; see `save_params`."""
     check_params(params)
-    description = _description(params)
-    lines = ["# An environment of jrcjax; jrcjax.load_params reads it."]
+    return "# An environment of jrcjax; jrcjax.load_params reads it.\n" + text_of(_description(params))
+
+
+def text_of(description: dict[str, Any]) -> str:
+    """The text of a file with this description; the same for equal ones."""
+    lines = [f"{name} = {_toml(description[name])}  # {_BASE[name].comment}" for name in _BASE if name in description]
     for prefix, keys, table in _tables_of(description):
-        if prefix:
+        if prefix and table:
             lines += ["", f"[{prefix.rstrip('.')}]"]
         lines += [f"{name} = {_toml(table[name])}  # {key.comment}" for name, key in keys.items() if name in table]
-    return "\n".join(lines) + "\n"
+    return "\n".join(lines).lstrip("\n") + "\n"
 
 
 def _tables_of(description: dict[str, Any]) -> Iterator[tuple[str, dict[str, _Key], dict[str, Any]]]:

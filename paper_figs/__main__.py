@@ -13,6 +13,7 @@ from rich.console import Console
 
 from sweeps import interrupts
 from sweeps.options import FLAGS, Count, Counts, Folder, Preset
+from sweeps.preset import label_of, preset_of
 from sweeps.sweep import Size, size_of
 
 
@@ -31,12 +32,13 @@ class Options:
     smoke: bool = False
     """A tiny version of everything."""
     preset: Preset = "paper"
-    """Table of parameters: paper or paper_table."""
+    """The paper's parameters: paper, paper_table, or a TOML file of what differs from them, such as one from
+    jrcjax.nuscenes."""
 
 
 def results_folder(out: Path, size: Size) -> Path:
     """Where results of one preset and length lie, so that runs of different ones don't meet."""
-    return out / "results" / f"{size.preset}-{size.episodes}-episodes"
+    return out / "results" / f"{label_of(size.preset)}-{size.episodes}-episodes"
 
 
 def make_figures(numbers: tuple[int, ...], size: Size, out: Path, console: Console) -> list[Path]:
@@ -102,7 +104,7 @@ def main(args: list[str] | None = None) -> int:
     parallel.keep_compiled()
     out = options.out or Path("out/smoke" if options.smoke else "out")
     try:
-        size = size_of(options.seeds, options.episodes, options.preset, options.smoke)
+        size = size_of(options.seeds, options.episodes, preset_of(options.preset), options.smoke)
         with interrupts.terminable():
             written = make_figures(options.only, size, out, Console(stderr=True))
     except KeyboardInterrupt:

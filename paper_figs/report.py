@@ -15,9 +15,10 @@ import numpy as np
 import xarray as xr
 
 from jrcjax.params import EnvParams
-from jrcjax.presets import ENVIRONMENTS, paper_params
+from jrcjax.presets import ENVIRONMENTS, PRESETS
 from jrcjax.types import READINGS
 from paper_figs.claims import Judgement
+from sweeps.preset import environment_of, label_of
 from sweeps.sweep import Size
 
 _TEMPLATE = Path(__file__).with_name("report.html.jinja")
@@ -67,6 +68,8 @@ def render(
     environment.filters["number"] = _number
     return environment.from_string(_TEMPLATE.read_text()).render(
         size=size,
+        preset=label_of(size.preset),
+        file=None if size.preset in PRESETS else size.preset,
         figures=figures,
         claims=[(claim, _figure_of(claim, figures)) for claim in claims],
         counts={verdict: sum(claim.verdict == verdict for claim in claims) for verdict in VERDICTS},
@@ -102,14 +105,15 @@ def _figure_of(claim: Judgement, figures: list[dict[str, Any]]) -> str | None:
 
 def _command(size: Size) -> str:
     """What makes the same figures and the same page."""
-    options = ["--seeds", str(size.seeds), "--episodes", str(size.episodes), "--preset", size.preset]
+    preset = size.preset if size.preset in PRESETS else "FILE.toml"
+    options = ["--seeds", str(size.seeds), "--episodes", str(size.episodes), "--preset", preset]
     smoke = [] if size.pretraining == Size.pretraining else ["--smoke"]
     return f"make figures ARGS={shlex.quote(shlex.join([*smoke, *options]))}"
 
 
 def _environments(preset: str) -> dict[str, list[str]]:
     """Every number of source and target by its path, without the bank, which follows from the others."""
-    both = [_numbers(paper_params(name, preset)) for name in ENVIRONMENTS]
+    both = [_numbers(environment_of(name, preset)) for name in ENVIRONMENTS]
     return {path: [numbers[path] for numbers in both] for path in both[0]}
 
 

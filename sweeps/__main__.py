@@ -15,6 +15,7 @@ from jrcjax.checks import refuse
 from sweeps import interrupts
 from sweeps.custom import CUSTOM, Custom, Options, custom_sweep
 from sweeps.options import FLAGS, Count, Preset
+from sweeps.preset import preset_of
 from sweeps.sweep import Study, size_of
 
 
@@ -34,7 +35,8 @@ class Run:
     episodes: Count = None
     """Episodes per seed. Default: 1000 (multiverse 500), or 20 with --smoke."""
     preset: Preset = "paper"
-    """Table of parameters: paper or paper_table."""
+    """The paper's parameters: paper, paper_table, or a TOML file of what differs from them, such as one from
+    jrcjax.nuscenes."""
     out: Annotated[Path, tyro.conf.arg(metavar="DIR")] = Path("out/results")
     """Folder for results."""
     resume: bool = False
@@ -90,9 +92,10 @@ def main(args: list[str] | None = None) -> int:
         if isinstance(command, Verify):
             return _verify(command)
         choice("name", command.name, (*STUDIES, CUSTOM))
-        own = _own(command, (*STUDIES, *EVERY_SWEEP))
+        preset = preset_of(command.preset)
+        own = _own(command, preset, (*STUDIES, *EVERY_SWEEP))
         study = Study(CUSTOM, "", (own.sweep,)) if own else STUDIES[command.name]
-        size = size_of(command.seeds, command.episodes, command.preset, command.smoke, study)
+        size = size_of(command.seeds, command.episodes, preset, command.smoke, study)
         size.check()
         sweeps = study.smoke_sweeps if command.smoke and study.smoke_sweeps else study.sweeps
         options = {"resume": command.resume, "save_agents": command.save_agents}
@@ -112,10 +115,10 @@ def main(args: list[str] | None = None) -> int:
     return 0
 
 
-def _own(command: Run, taken: tuple[str, ...]) -> Custom | None:
+def _own(command: Run, preset: str, taken: tuple[str, ...]) -> Custom | None:
     """The sweep that the options of `run custom` describe; other sweeps refuse these options."""
     if command.name == CUSTOM:
-        return custom_sweep(command.custom, command.preset, taken)
+        return custom_sweep(command.custom, preset, taken)
     given = [name for name, value in vars(command.custom).items() if value != getattr(Options(), name)]
     if given:
         refuse("name", command.name, f"{CUSTOM}, for which alone --{given[0]} is")

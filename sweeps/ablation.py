@@ -7,7 +7,7 @@ import dataclasses
 import jax.numpy as jnp
 
 from jrcjax.hparams import HParams
-from jrcjax.presets import paper_params
+from sweeps.preset import environment_of
 from sweeps.sources import SOURCE
 from sweeps.sweep import Sweep
 
@@ -37,7 +37,7 @@ ABLATION = Sweep(
     learners=("tlwd",),
     x_name="variant",
     x_values=tuple(float(number) for number in range(len(VARIANTS))),
-    params_at=lambda x, preset: paper_params("target", preset),
+    params_at=lambda x, preset: environment_of("target", preset),
     hparams_at=hparams_at,
     source=SOURCE,
 )

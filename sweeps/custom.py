@@ -15,9 +15,10 @@ from jrcjax.episodes import learner_for, spec_of
 from jrcjax.hparams import Config, HParams, check_hparams
 from jrcjax.learners import LEARNERS
 from jrcjax.params import EnvParams, check_params
-from jrcjax.presets import ENVIRONMENTS, paper_params
+from jrcjax.presets import ENVIRONMENTS
 from jrcjax.types import choice
 from sweeps.parameters import Parameter, parameter_at
+from sweeps.preset import environment_of
 from sweeps.program import Points
 from sweeps.sources import SOURCE
 from sweeps.sweep import Sweep
@@ -107,7 +108,7 @@ def _split(option: str, text: str, allowed: str) -> tuple[str, str]:
 
 def _base(base: str, preset: str) -> EnvParams:
     if base in ENVIRONMENTS:
-        return paper_params(base, preset)
+        return environment_of(base, preset)
     if not base.endswith(".toml"):
         refuse("base", base, f"{', '.join(ENVIRONMENTS)}, or a file that ends in .toml")
     from jrcjax import load_params
@@ -118,7 +119,7 @@ def _base(base: str, preset: str) -> EnvParams:
 def _source(learners: tuple[str, ...], params: EnvParams, preset: str) -> Sweep | None:
     """What trains the source agents, if learners need them: in the paper's source environment."""
     needing = [name for name in learners if learner_for(name, params, Config()).needs_source]
-    source = spec_of(paper_params("source", preset))
+    source = spec_of(environment_of("source", preset))
     if needing and source[:2] != spec_of(params)[:2]:
         allowed = f"learners without transfer, for levels {params.shape} and {params.num_actions} actions"
         refuse("learners", " ".join(needing), allowed)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from jrcjax.presets import paper_params
+from sweeps.preset import environment_of
 from sweeps.sweep import Sweep
 
 FIG5A = Sweep(
@@ -11,5 +11,5 @@ FIG5A = Sweep(
     learners=("ddqn", "q_learning", "round_robin"),
     x_name="environment",
     x_values=(0.0,),
-    params_at=lambda x, preset: paper_params("source", preset),
+    params_at=lambda x, preset: environment_of("source", preset),
 )

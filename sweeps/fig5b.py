@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from jrcjax.presets import paper_params
 from jrcjax.transfer import TARGET_LEARNERS
+from sweeps.preset import environment_of
 from sweeps.sources import SOURCE
 from sweeps.sweep import Sweep
 
@@ -13,6 +13,6 @@ FIG5B = Sweep(
     learners=TARGET_LEARNERS,
     x_name="environment",
     x_values=(0.0,),
-    params_at=lambda x, preset: paper_params("target", preset),
+    params_at=lambda x, preset: environment_of("target", preset),
     source=SOURCE,
 )

@@ -5,14 +5,14 @@ from __future__ import annotations
 import dataclasses
 
 from jrcjax.params import EnvParams
-from jrcjax.presets import paper_params
+from sweeps.preset import environment_of
 from sweeps.sources import SOURCE
 from sweeps.sweep import Sweep
 
 
 def params_at(p: float, preset: str) -> EnvParams:
     """The target environment with p_1^v = p."""
-    params = paper_params("target", preset)
+    params = environment_of("target", preset)
     speed = dataclasses.replace(params.speed, event_probability=params.speed.event_probability.at[1].set(p))
     return dataclasses.replace(params, speed=speed)
 

@@ -7,14 +7,14 @@ import dataclasses
 import jax.numpy as jnp
 
 from jrcjax.params import FACTORS, EnvParams
-from jrcjax.presets import paper_params
+from sweeps.preset import environment_of
 from sweeps.sources import SOURCE
 from sweeps.sweep import Sweep
 
 
 def params_at(tau: float, preset: str) -> EnvParams:
     """The target environment with tau_0 = tau for every factor, the channel included."""
-    params = paper_params("target", preset)
+    params = environment_of("target", preset)
     prior = jnp.asarray([tau, 1.0 - tau], jnp.float32)
     factors = {name: dataclasses.replace(getattr(params, name), prior=prior) for name in FACTORS}
     return dataclasses.replace(params, **factors)

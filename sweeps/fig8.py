@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
+from functools import lru_cache
 
 from jrcjax.params import EnvParams
-from jrcjax.presets import paper_params, paper_radar
+from sweeps.preset import environment_of
 from sweeps.sources import SOURCE
 from sweeps.sweep import Sweep
 
 
+@lru_cache  # the bank of placements takes seconds to draw
 def params_at(density: float, preset: str) -> EnvParams:
     """The target environment with omega = density."""
-    return dataclasses.replace(paper_params("target", preset), radar=paper_radar(density))
+    params = environment_of("target", preset)
+    return dataclasses.replace(params, radar=params.radar.replace(density=density))  # pyright: ignore
 
 
 FIG8 = Sweep(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import jax.numpy as jnp
 
 from jrcjax.hparams import HParams
-from jrcjax.presets import paper_params
+from sweeps.preset import environment_of
 from sweeps.sources import SOURCE
 from sweeps.sweep import Sweep
 
@@ -24,7 +24,7 @@ FIG9 = Sweep(
     learners=("tlwd",),
     x_name="prioritised",
     x_values=(1.0, 0.0),
-    params_at=lambda x, preset: paper_params("target", preset),
+    params_at=lambda x, preset: environment_of("target", preset),
     hparams_at=hparams_at,
     source=SOURCE,
 )

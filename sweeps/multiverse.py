@@ -8,7 +8,6 @@ thus be told from each other, though not from interactions of others.
 from __future__ import annotations
 
 import dataclasses
-import functools
 import itertools
 from typing import Any, NamedTuple
 
@@ -18,11 +17,11 @@ import numpy as np
 
 from jrcjax.hparams import HParams
 from jrcjax.params import EnvParams
-from jrcjax.presets import paper_params
 from jrcjax.radar import Radar
 from jrcjax.transfer import TARGET_LEARNERS
 from jrcjax.types import COUNTING_RULES, DISTANCES, EVENT_MODELS, INITIAL_WEIGHTS, MISS_CONVENTIONS, choice
 from sweeps import fig6, fig7, fig8, fig9
+from sweeps.preset import environment_of
 from sweeps.sweep import Size, Study, Sweep
 
 SIZE = Size(seeds=4, episodes=500)
@@ -111,24 +110,29 @@ def read_as(params: EnvParams, universe: Universe) -> EnvParams:
     return dataclasses.replace(
         params,
         speed=dataclasses.replace(params.speed, event_probability=probability),
-        radar=_radar(float(params.radar.density), *universe.resolution),
+        radar=_radar(params.radar, *universe.resolution),
         event_model=jnp.int32(choice("event_model", universe.event_model, EVENT_MODELS)),
         miss_convention=jnp.int32(choice("miss_convention", universe.miss_convention, MISS_CONVENTIONS)),
         terminal_time_limit=jnp.int32(universe.time_limit == "terminal"),
     )
 
 
-@functools.cache
-def _radar(density: float, distance: str, rule: str) -> Radar:
-    """The radar under a reading; its bank takes seconds to draw, and universes share it."""
-    radar = fig8.params_at(density, "paper").radar
-    if (distance, rule) == LEVELS["resolution"][0]:
-        return radar
+def _radar(radar: Radar, distance: str, rule: str) -> Radar:
+    """A radar under a reading."""
     readings = {
-        "distance": jnp.int32(choice("distance", distance, DISTANCES)),
-        "counting_rule": jnp.int32(choice("counting_rule", rule, COUNTING_RULES)),
+        "distance": choice("distance", distance, DISTANCES),
+        "counting_rule": choice("counting_rule", rule, COUNTING_RULES),
     }
-    return radar.replace(**readings)  # pyright: ignore[reportAttributeAccessIssue]
+    if all(int(getattr(radar, name)) == index for name, index in readings.items()):
+        return radar
+    # The new bank takes seconds to draw, and universes share it.
+    made_from = (*np.asarray(radar.bank_inputs).tolist(), radar.max_objects, *readings.values())
+    if made_from not in _RADARS:
+        _RADARS[made_from] = radar.replace(**{name: jnp.int32(index) for name, index in readings.items()})  # pyright: ignore
+    return _RADARS[made_from]
+
+
+_RADARS: dict[tuple, Radar] = {}
 
 
 def hparams_of(hparams: HParams, universe: Universe) -> HParams:
@@ -166,7 +170,7 @@ def sweep_of(optimiser: str, universes: tuple[Universe, ...]) -> Sweep:
         learners=("ddqn", "q_learning", "round_robin"),
         x_name="universe",
         x_values=tuple(map(float, range(number))),
-        params_at=lambda x, preset: read_as(paper_params("source", preset), universes[int(x)]),
+        params_at=lambda x, preset: read_as(environment_of("source", preset), universes[int(x)]),
         hparams_at=lambda x: hparams_of(HParams(), universes[int(x)]),
         optimiser=optimiser,
         seeds_per_part=1,

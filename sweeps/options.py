@@ -17,6 +17,6 @@ Count: TypeAlias = Annotated[int | None, _shown_as("N")]
 Counts: TypeAlias = Annotated[tuple[int, ...], _shown_as("N ...")]
 Folder: TypeAlias = Annotated[Path | None, _shown_as("DIR")]
 File: TypeAlias = Annotated[Path | None, _shown_as("FILE")]
-Preset: TypeAlias = Annotated[str, tyro.conf.arg(metavar="NAME")]
+Preset: TypeAlias = Annotated[str, tyro.conf.arg(metavar="NAME|FILE")]
 FLAGS = (tyro.conf.FlagCreatePairsOff,)
 """How switches are shown: --smoke, without --no-smoke beside it."""

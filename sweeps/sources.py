@@ -18,11 +18,11 @@ from jrcjax.hparams import Config
 from jrcjax.learners import Source, Spec, make_learner
 from jrcjax.learners.q_function import q_function
 from jrcjax.n_step import NStepTransition
-from jrcjax.presets import paper_params
 from jrcjax.source import source_of
 from sweeps import store
 from sweeps.estimate import seconds_per_episode
 from sweeps.parts import parts_of
+from sweeps.preset import environment_of
 from sweeps.program import joined, keys_of, points_of, reference_of, run_block, spec_of_points
 from sweeps.sweep import Size, Sweep
 
@@ -32,7 +32,7 @@ SOURCE = Sweep(
     learners=("ddqn",),
     x_name="environment",
     x_values=(0.0,),
-    params_at=lambda x, preset: paper_params("source", preset),
+    params_at=lambda x, preset: environment_of("source", preset),
 )
 
 

@@ -11,6 +11,7 @@ from jrcjax.hparams import Config, HParams
 from jrcjax.params import EnvParams
 from jrcjax.presets import PRESETS
 from jrcjax.types import choice
+from sweeps.preset import check_preset
 
 MOST_SEEDS = 1_000_000
 """Whose numbers fit the names of parts."""
@@ -63,7 +64,7 @@ class Size:
     episodes: int = 1000
     """Episodes per seed, in the source as in the target."""
     preset: str = "paper"
-    """Table of parameters: "paper" or "paper_table"."""
+    """What the environments are made from, see `sweeps.preset`."""
     pretraining: int = Config.pretraining
     """TLwD's updates before its first episode."""
     demonstrations: int = Config.demonstrations
@@ -75,7 +76,7 @@ class Size:
         require_integer("episodes", self.episodes, 1, _MOST_EPISODES)
         require_integer("pretraining", self.pretraining, 0)
         require_integer("demonstrations", self.demonstrations, 1, Config.replay_capacity - 1)
-        choice("preset", self.preset, PRESETS)
+        check_preset(self.preset)
 
 
 SMOKE = Size(seeds=2, episodes=20, pretraining=200, demonstrations=1000)
@@ -92,7 +93,7 @@ class Study:
     size: Size = Size()
     """Unless the command line says otherwise."""
     presets: tuple[str, ...] = PRESETS
-    """Tables of parameters that it can be run with."""
+    """Tables of the paper's parameters that it can be run with."""
     smoke_sweeps: tuple[Sweep, ...] | None = None
     """What the tiny version runs instead of `sweeps`."""
     smoke_size: Size = SMOKE
@@ -101,7 +102,8 @@ class Study:
 def size_of(seeds: int | None, episodes: int | None, preset: str, smoke: bool, study: Study | None = None) -> Size:
     """The size that command-line options ask for."""
     usual, tiny, presets = (study.size, study.smoke_size, study.presets) if study else (Size(), SMOKE, PRESETS)
-    choice("preset", preset, presets)
+    if preset in PRESETS:
+        choice("preset", preset, presets)
     size = replace(tiny if smoke else usual, preset=preset)
     given = {"seeds": seeds, "episodes": episodes}
     return replace(size, **{name: value for name, value in given.items() if value is not None})

@@ -231,7 +231,7 @@ def test_one_command_writes_everything(tmp_path):
     [
         (["--only", "4"], "only: [4]; allowed: 5, 6, 7, 8, 9"),
         (["--seeds", "-1"], "seeds: -1; allowed: an int from 1"),
-        (["--preset", "x"], "preset: 'x' is unknown; allowed: 'paper', 'paper_table'"),
+        (["--preset", "x"], "preset: 'x'; allowed: paper, paper_table, or a file"),
     ],
 )
 def test_command_line_errors_write_nothing(arguments, message, capsys, tmp_path):
