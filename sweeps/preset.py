@@ -54,6 +54,8 @@ def check_preset(preset: str) -> None:
     """Raises ValueError naming the field, the value and what is allowed."""
     if not isinstance(preset, str) or (preset not in PRESETS and "\n" not in preset):
         refuse("preset", str(preset), _ALLOWED)
+    if preset in PRESETS:
+        return
     for name in ENVIRONMENTS:
         params, paper = environment_of(name, preset), paper_params(name)
         if (params.shape, params.num_actions) != (paper.shape, paper.num_actions):

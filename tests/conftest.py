@@ -9,11 +9,13 @@ import pytest
 import reference
 
 import jrcjax
+from jrcjax import parallel
 from jrcjax.channel import Channel
 from jrcjax.params import EnvParams, make_factor
 from jrcjax.radar import make_radar
 
 jax.config.update("jax_num_cpu_devices", 2)  # nothing above makes an array
+parallel.keep_compiled()  # most of the time goes into compiling, often of what another process compiled before
 
 PAPER = [(environment, preset) for preset in ("paper", "paper_table") for environment in ("source", "target")]
 RANDOM_SEEDS = (0, 1, 2)
