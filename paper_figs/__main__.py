@@ -65,7 +65,7 @@ def make_figures(numbers: tuple[int, ...], size: Size, out: Path, console: Conso
     results = results_folder(out, size)
     seconds = expected_seconds([SWEEPS[figure.name] for figure in wanted], size, results)
     console.print(
-        f"{len(wanted)} figures, {size.seeds} seeds, {size.episodes} episodes: about {in_words(seconds)} in all"
+        f"figures: {len(wanted)}, seeds: {size.seeds}, episodes: {size.episodes}; about {in_words(seconds)} in all"
     )
     written, pictures, judgements, optima, diverged, manifests = [], {}, [], [], [], {}
     tables: dict[str, list[pd.DataFrame]] = {"regret": [], "seeds_needed": []}
