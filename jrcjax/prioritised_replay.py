@@ -96,7 +96,7 @@ def sample(memory: Memory, words: Words, where: Layout) -> Sample:
     # would copy the whole tree in every step.
     indices, values = sum_tree.sample(memory.tree, words, where.tree)
     rows = memory.rows.at[indices].get(mode="promise_in_bounds")
-    probability = values / sum_tree.total(memory.tree)
+    probability = values / sum_tree.total(memory.tree, where.tree)
     return Sample(packing.unpack(rows, where.rows), indices, probability, indices < where.demonstrations)
 
 

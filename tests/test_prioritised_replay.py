@@ -148,7 +148,7 @@ def test_the_papers_memory_keeps_the_demonstrations_and_the_newest_of_the_rest(a
     assert held(memory, where) == dict.fromkeys([*range(demonstrations), *newest], 1.0)
     first = jax.tree.map(lambda field: field[:demonstrations], everything(memory, where)[1])
     assert number_of(first).tolist() == list(range(demonstrations))
-    assert float(sum_tree.total(memory.tree)) == demonstrations + len(newest)
+    assert float(sum_tree.total(memory.tree, where.tree)) == demonstrations + len(newest)
     assert int(memory_of.size(jnp.int32(added), where)) == demonstrations + len(newest)
 
 
@@ -157,7 +157,7 @@ def test_before_the_first_new_transition_only_demonstrations_are_sampled():
     memory = INIT(numbered(np.arange(16)), where)
     for count in range(-5, 0):
         memory = ADD(memory, numbered(10**6), jnp.int32(count), where)
-        assert float(sum_tree.total(memory.tree)) == 16.0
+        assert float(sum_tree.total(memory.tree, where.tree)) == 16.0
     edges = jnp.asarray([[0, 0, 2**32 - 1, 2**32 - 1], [0, 2**32 - 1, 0, 2**32 - 1]], jnp.uint32)
     batch = SAMPLE(memory, jnp.concatenate([edges, words_of(0, 5000)], axis=1), where)
     assert set(number_of(batch.transitions)) == set(range(16))
