@@ -1,4 +1,4 @@
-"""Claim: the replay capacity does not change the cost of a step.
+"""Claim: the replay capacity hardly changes the cost of a step.
 
 A compiler that copies a whole memory in every step instead of writing one row shows here first: ten times the capacity
 would cost about ten times as much.

@@ -8,7 +8,7 @@ from jrcjax.provenance import usable_cores
 from sweeps.sweep import Size, Sweep
 
 # Core time of one agent in one slot, microseconds, on the machine of the README's table of speeds.
-_CORE_US = {"tlwd": 14.0, "dpr": 4.6, "ddqn": 4.6, "q_learning": 0.5, "round_robin": 0.3}
+_CORE_US = {"tlwd": 6.5, "dpr": 2.8, "ddqn": 2.8, "q_learning": 0.4, "round_robin": 0.2}
 _SLOTS = EnvParams.max_steps_in_episode
 
 
