@@ -18,7 +18,7 @@ from jrcjax import rng
 from jrcjax.types import Float, Int, Words
 
 RADIX = 4
-"""Children per node, a power of two; of 2, 4, 8, 16 and 32 the fastest for 50,000 leaves, 64 draws and 64 updates."""
+"""Children per node, a power of two; of 4, 8, 16 and 32 the fastest for 50,000 leaves, 64 draws and 64 updates."""
 _TOP_ROWS = 16  # rows of the top level, at most
 NUM_WORDS = 2
 """Random words of one draw."""

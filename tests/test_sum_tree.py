@@ -14,7 +14,7 @@ from jrcjax import sum_tree
 
 RADIX = sum_tree.RADIX
 # Below, at and above every size at which a level or a node begins.
-SIZES = [1, 2, 3, 4, 5, 64, 65, 256, 257, 4096, 4097, 50_000]
+SIZES = [1, 2, 3, 4, 5, 64, 65, 256, 257, 1024, 1025, 4096, 4097, 16_384, 16_385, 50_000]
 # A sum of RADIX numbers >= 0, in any order.
 RTOL = RADIX * float(np.finfo(np.float32).eps)
 LARGEST_WORD = 2**32 - 1
