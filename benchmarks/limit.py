@@ -27,13 +27,13 @@ PRODUCTS = {
 
 def run(quick: bool) -> list[Result]:
     """Measures all products and a DDQN step, and prints a table."""
-    from jrcjax import parallel
+    from jrcjax.training import parallel
 
     parallel.use_all_cores()
     import jax
     import jax.numpy as jnp
 
-    from jrcjax.networks import product
+    from jrcjax.learners.networks import product
 
     agents, steps = parallel.BLOCK * jax.device_count(), 1000 if quick else 4000
 

@@ -17,7 +17,7 @@ def compiled(function: Any, *args: Any) -> tuple[Any, float]:
 
 def environment(agents: int, steps: int) -> Ready:
     """Slots of the public environment under random actions, automatic reset included."""
-    from jrcjax import parallel
+    from jrcjax.training import parallel
 
     parallel.use_all_cores()
     import jax
@@ -49,7 +49,7 @@ def learner(name: str, agents: int, steps: int, devices: int | None = None, **se
     The agents go on from one repetition to the next, DDQN and TLwD with a memory that is full from the start. TLwD goes
     without pre-training, so that a step is one of its online steps.
     """
-    from jrcjax import parallel
+    from jrcjax.training import parallel
 
     parallel.use_all_cores()
     import jax
@@ -59,8 +59,8 @@ def learner(name: str, agents: int, steps: int, devices: int | None = None, **se
     import jax.numpy as jnp
 
     import jrcjax
-    from jrcjax import n_step, packing, prioritised_replay, replay
-    from jrcjax.episodes import init_agent, learner_for, run_episodes
+    from jrcjax.replay import n_step, packing, prioritised, uniform
+    from jrcjax.training.rollout import init_agent, learner_for, run_episodes
 
     params, hparams = jrcjax.paper_params("source"), jrcjax.HParams()
     episodes = max(steps // params.max_steps_in_episode, 1)
@@ -76,12 +76,12 @@ def learner(name: str, agents: int, steps: int, devices: int | None = None, **se
             return new
         size, states, actions = config.replay_capacity, params.num_states, params.num_actions
         ids = jax.random.randint(key, (4, size), 0, jnp.array([[states], [actions], [states], [1]]))
-        one_step = replay.Transition(ids[0], ids[1], jax.random.normal(key, (size,)), ids[2], ids[3])
+        one_step = uniform.Transition(ids[0], ids[1], jax.random.normal(key, (size,)), ids[2], ids[3])
         if name == "ddqn":
-            ring = packing.pack(one_step, replay.layout(states, actions))
+            ring = packing.pack(one_step, uniform.layout(states, actions))
             return new._replace(learner=new.learner._replace(ring=ring))
         items = n_step.NStepTransition(*one_step, one_step.reward, jnp.full(size, 0.9), one_step.next_state)
-        memory = prioritised_replay.init(items, prioritised_replay.layout(states, actions, size, size))
+        memory = prioritised.init(items, prioritised.layout(states, actions, size, size))
         return new._replace(learner=new.learner._replace(memory=memory))
 
     start = parallel.over_agents(agent)

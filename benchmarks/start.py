@@ -15,7 +15,7 @@ import time
 from benchmarks.measure import Result
 
 _FIRST_STEP = """
-from jrcjax import parallel
+from jrcjax.training import parallel
 parallel.use_all_cores(); parallel.keep_compiled()
 import jax, jrcjax
 env = jrcjax.JRCEnv()
@@ -25,11 +25,12 @@ jax.block_until_ready(jax.jit(env.step)(key, state, 0))
 """
 _SWEEP = """
 import sys, time
-from jrcjax import parallel
+from jrcjax.training import parallel
 parallel.use_all_cores(); parallel.keep_compiled()
 import jax, jrcjax, numpy as np
-from jrcjax.episodes import spec_of
-from sweeps import program, registry
+from jrcjax.training.rollout import spec_of
+from sweeps.engine import program
+from sweeps.studies import registry
 from sweeps.sweep import Size
 sweep = registry.SWEEPS[sys.argv[1]]
 size = Size()
@@ -56,7 +57,7 @@ print(time.perf_counter() - begin)
 
 def run(quick: bool) -> list[Result]:
     """Measures the first step and all sweeps, cold and warm, and prints a table."""
-    from sweeps.registry import SWEEPS
+    from sweeps.studies.registry import SWEEPS
 
     print(f"{'s':>24s}{'cold':>8s}{'again':>8s}")
     with tempfile.TemporaryDirectory() as cache:

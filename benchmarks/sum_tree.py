@@ -21,13 +21,14 @@ LEAVES, BATCH = 50_000, 64
 
 def run(quick: bool) -> list[Result]:
     """Measures all radices, one repetition of each in turn, and prints a table."""
-    from jrcjax import parallel
+    from jrcjax.training import parallel
 
     parallel.use_all_cores()
     import jax
     import jax.numpy as jnp
 
-    from jrcjax import rng, sum_tree
+    from jrcjax import rng
+    from jrcjax.replay import sum_tree
 
     steps, trees = 1000 if quick else 5000, parallel.padded(1)
 

@@ -12,9 +12,10 @@ import jax
 import jax.numpy as jnp
 
 import jrcjax
-from jrcjax import rng, states
+from jrcjax import rng
 from jrcjax.exact import greedy_policy
 from jrcjax.learners import Learner
+from jrcjax.model import states
 
 TEMPERATURE = 30.0  # in units of reward: smaller differences between actions hardly count
 

@@ -23,9 +23,9 @@ from stable_baselines3 import DQN  # pyright: ignore[reportMissingImports]
 from stable_baselines3.common.callbacks import BaseCallback  # pyright: ignore[reportMissingImports]
 
 import jrcjax
-import jrcjax.parallel
-from jrcjax import states
+import jrcjax.training.parallel
 from jrcjax.adapters import GymnasiumEnv
+from jrcjax.model import states
 from jrcjax.types import Float
 
 
@@ -118,5 +118,5 @@ def main(args: list[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    jrcjax.parallel.use_all_cores()
+    jrcjax.training.parallel.use_all_cores()
     main()

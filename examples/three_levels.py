@@ -14,7 +14,7 @@ import tyro
 from matplotlib.figure import Figure
 
 import jrcjax
-import jrcjax.parallel
+import jrcjax.training.parallel
 
 FILE = Path(__file__).with_suffix(".toml")
 
@@ -67,5 +67,5 @@ def main(args: list[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    jrcjax.parallel.use_all_cores()
+    jrcjax.training.parallel.use_all_cores()
     main()

@@ -5,18 +5,18 @@ with Joint Radar-Data Communications" (arXiv:2105.13670), called the paper throu
 """
 
 from jrcjax import events, exact, radar
-from jrcjax.environment import EnvState, JRCEnv
-from jrcjax.episodes import AgentState, Log
-from jrcjax.hparams import Config, HParams
+from jrcjax.agents.file import load_agent, save_agent, save_agents
+from jrcjax.agents.saved_agent import Evaluation, SavedAgent
+from jrcjax.config.toml import load_params, save_params
 from jrcjax.learners import Source
-from jrcjax.params import EnvParams, check_params
-from jrcjax.params_file import load_params, save_params
-from jrcjax.presets import paper_params
-from jrcjax.saved_agent import Evaluation, SavedAgent
-from jrcjax.saving import load_agent, save_agent, save_agents
-from jrcjax.source import train_source
-from jrcjax.training import train, train_agents
-from jrcjax.transfer import Transfer, transfer
+from jrcjax.learners.hparams import Config, HParams
+from jrcjax.model.environment import EnvState, JRCEnv
+from jrcjax.model.params import EnvParams, check_params
+from jrcjax.model.presets import paper_params
+from jrcjax.training.rollout import AgentState, Log
+from jrcjax.training.source import train_source
+from jrcjax.training.train import train, train_agents
+from jrcjax.training.transfer import Transfer, transfer
 
 __version__ = "0.1.0"
 

@@ -11,15 +11,15 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jrcjax import metrics, states
-from jrcjax.channel import delivered_packets
 from jrcjax.checks import is_positive, require
-from jrcjax.events import event_probability
-from jrcjax.params import EnvParams, of_params
-from jrcjax.radar import mean_miss_ratio
-from jrcjax.rewards import reward
+from jrcjax.model import metrics, states
+from jrcjax.model.channel import delivered_packets
+from jrcjax.model.events import event_probability
+from jrcjax.model.params import EnvParams, of_params
+from jrcjax.model.rewards import reward
+from jrcjax.policies import greedy_policy
+from jrcjax.radar.modes import mean_miss_ratio
 from jrcjax.types import Float, Int
-from jrcjax.value_learning import greedy_policy
 
 __all__ = [
     "LongRun",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import importlib.metadata
-import os
 import platform
 import shlex
 import subprocess
@@ -15,6 +14,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from jrcjax.machine import usable_cores
+
 _PACKAGES = ("jrcjax", "jax", "jaxlib", "flax", "optax", "chex", "distrax", "numpy", "scipy", "xarray")
 _WORKS_FOR: ContextVar[str | None] = ContextVar("_WORKS_FOR", default=None)
 _VECTOR_FLAGS = ("avx", "fma", "f16c", "amx", "asimd", "sve")
@@ -23,23 +24,6 @@ _VECTOR_FLAGS = ("avx", "fma", "f16c", "amx", "asimd", "sve")
 def versions() -> dict[str, str]:
     """Versions of Python and of the packages that results depend on."""
     return {"python": platform.python_version()} | {p: importlib.metadata.version(p) for p in _PACKAGES}
-
-
-def usable_cores() -> int:
-    """Cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
-def physical_memory() -> int:
-    """Bytes of main memory that this process may use."""
-    installed = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    try:
-        limit = Path("/sys/fs/cgroup/memory.max").read_text().strip()
-    except OSError:
-        return installed
-    return min(installed, int(limit)) if limit.isdigit() else installed
 
 
 def machine() -> dict[str, Any]:

@@ -17,13 +17,14 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.patches import Arc, Patch, Polygon, Rectangle
 
-from jrcjax import chirp, slot, states
 from jrcjax.checks import require
-from jrcjax.detection import merged_objects
-from jrcjax.environment import EnvState
-from jrcjax.params import FACTORS, EnvParams
-from jrcjax.placement import Footprints
-from jrcjax.radar import slot_placement
+from jrcjax.model import slot, states
+from jrcjax.model.environment import EnvState
+from jrcjax.model.params import FACTORS, EnvParams
+from jrcjax.radar import chirp
+from jrcjax.radar.detection import merged_objects
+from jrcjax.radar.modes import slot_placement
+from jrcjax.radar.placement import Footprints
 from jrcjax.types import EVENT_MODELS, Float, Int, Key, Words
 
 # Okabe and Ito's colours, which stay apart for the colour-blind; fill and outline say the same without colour.

@@ -33,7 +33,7 @@ class Options:
     """A tiny version of everything."""
     preset: Preset = "paper"
     """The paper's parameters: paper, paper_table, or a TOML file of what differs from them, such as one from
-    jrcjax.nuscenes."""
+    jrcjax.config.nuscenes."""
 
 
 def results_folder(out: Path, size: Size) -> Path:
@@ -49,12 +49,15 @@ def make_figures(numbers: tuple[int, ...], size: Size, out: Path, console: Conso
     """
     import pandas as pd
 
-    from paper_figs import claims, divergence, ranking, regret, report, style
+    from paper_figs import report
+    from paper_figs.analysis import divergence, ranking, regret
+    from paper_figs.claims import judge
     from paper_figs.figures import FIGURES, NUMBERS
-    from sweeps import store
-    from sweeps.estimate import in_words
-    from sweeps.registry import SWEEPS
-    from sweeps.run import expected_seconds, run_sweep
+    from paper_figs.plots import style
+    from sweeps.engine.estimate import in_words
+    from sweeps.engine.run import expected_seconds, run_sweep
+    from sweeps.results import store
+    from sweeps.studies.registry import SWEEPS
 
     unknown = sorted(set(numbers) - set(NUMBERS))
     if unknown:
@@ -88,7 +91,7 @@ def make_figures(numbers: tuple[int, ...], size: Size, out: Path, console: Conso
         pd.concat(parts).to_csv(out / f"{name}.csv", index=False, float_format="%.6g")
         written.append(out / f"{name}.csv")
     page = report.render(size, pictures, judgements, optima, diverged, manifests)
-    texts = {"claims.json": json.dumps(claims.as_json(judgements), indent=2) + "\n", "report.html": page}
+    texts = {"claims.json": json.dumps(judge.as_json(judgements), indent=2) + "\n", "report.html": page}
     for name, text in texts.items():
         (out / name).write_text(text)
         written.append(out / name)
@@ -98,7 +101,7 @@ def make_figures(numbers: tuple[int, ...], size: Size, out: Path, console: Conso
 def main(args: list[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     options = tyro.cli(Options, prog="python -m paper_figs", args=args, config=FLAGS)
-    from jrcjax import parallel  # after parsing, so that --help and errors come at once
+    from jrcjax.training import parallel  # after parsing, so that --help and errors come at once
 
     parallel.use_all_cores()
     parallel.keep_compiled()

@@ -10,8 +10,9 @@ import pandas as pd
 import xarray as xr
 from matplotlib.figure import Figure
 
-from paper_figs import curves, learning_claims, points, sweep_claims
-from paper_figs.claims import Judgement
+from paper_figs.claims import learning_claims, sweep_claims
+from paper_figs.claims.judge import Judgement
+from paper_figs.plots import curves, points
 
 
 @dataclass(frozen=True)

@@ -15,18 +15,19 @@ import jax.numpy as jnp
 import pandas as pd
 import xarray as xr
 
-from jrcjax import exact, parallel
-from jrcjax.hparams import Config, HParams
-from jrcjax.presets import paper_params
-from jrcjax.transfer import transfer
+from jrcjax import exact
+from jrcjax.learners.hparams import Config, HParams
+from jrcjax.model.presets import paper_params
+from jrcjax.training import parallel
+from jrcjax.training.transfer import transfer
 from paper_figs.__main__ import results_folder
-from paper_figs.claims import first
-from paper_figs.convergence import TOLERANCE, convergence_episode, gaps
+from paper_figs.analysis.convergence import TOLERANCE, convergence_episode, gaps
+from paper_figs.analysis.statistics import CONFIDENCE
+from paper_figs.claims.judge import first
+from paper_figs.claims.learning_claims import source_claims
 from paper_figs.figures import FIGURES
-from paper_figs.learning_claims import source_claims
-from paper_figs.statistics import CONFIDENCE
-from sweeps import store
-from sweeps.ablation import VARIANTS
+from sweeps.results import store
+from sweeps.studies.ablation import VARIANTS
 from sweeps.sweep import Size
 
 MULTIVERSE = Path(__file__).parent / "multiverse"

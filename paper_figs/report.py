@@ -14,10 +14,10 @@ import jinja2
 import numpy as np
 import xarray as xr
 
-from jrcjax.params import EnvParams
-from jrcjax.presets import ENVIRONMENTS, PRESETS
+from jrcjax.model.params import EnvParams
+from jrcjax.model.presets import ENVIRONMENTS, PRESETS
 from jrcjax.types import READINGS
-from paper_figs.claims import Judgement
+from paper_figs.claims.judge import Judgement
 from sweeps.preset import environment_of, label_of
 from sweeps.sweep import Size
 

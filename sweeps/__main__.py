@@ -13,9 +13,9 @@ from rich.console import Console
 
 from jrcjax.checks import refuse
 from sweeps import interrupts
-from sweeps.custom import CUSTOM, Custom, Options, custom_sweep
 from sweeps.options import FLAGS, Count, Preset
 from sweeps.preset import preset_of
+from sweeps.studies.custom import CUSTOM, Custom, Options, custom_sweep
 from sweeps.sweep import Study, size_of
 
 
@@ -36,7 +36,7 @@ class Run:
     """Episodes per seed. Default: 1000 (multiverse 500), or 20 with --smoke."""
     preset: Preset = "paper"
     """The paper's parameters: paper, paper_table, or a TOML file of what differs from them, such as one from
-    jrcjax.nuscenes."""
+    jrcjax.config.nuscenes."""
     out: Annotated[Path, tyro.conf.arg(metavar="DIR")] = Path("out/results")
     """Folder for results."""
     resume: bool = False
@@ -72,15 +72,15 @@ Command = (
 def main(args: list[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     command = tyro.cli(Command, prog="python -m sweeps", args=args, description=__doc__, config=FLAGS)
-    from jrcjax import parallel  # after parsing, so that --help and errors come at once
+    from jrcjax.training import parallel  # after parsing, so that --help and errors come at once
     from jrcjax.types import choice
-    from paper_figs import custom
+    from paper_figs.studies import custom
 
     parallel.use_all_cores()
     parallel.keep_compiled()
-    from paper_figs.studies import SUMMARIES
-    from sweeps.registry import EVERY_SWEEP, STUDIES
-    from sweeps.run import run_sweep
+    from paper_figs.studies.summaries import SUMMARIES
+    from sweeps.engine.run import run_sweep
+    from sweeps.studies.registry import EVERY_SWEEP, STUDIES
 
     console = Console(stderr=True)
     if isinstance(command, List):
@@ -129,15 +129,15 @@ def _client(command: Run) -> contextlib.AbstractContextManager:
     """The client of the cluster that the command asks for, None if it asks for none."""
     if command.scheduler is None and command.workers is None:
         return contextlib.nullcontext()
-    from sweeps.distributed import client_of
+    from sweeps.engine.distributed import client_of
 
     return client_of(command.scheduler, command.workers)
 
 
 def _verify(command: Verify) -> int:
     """Prints what differs; returns the exit status."""
-    from sweeps import verify
-    from sweeps.registry import EVERY_SWEEP
+    from sweeps.engine import verify
+    from sweeps.studies.registry import EVERY_SWEEP
 
     differ = 0
     for part, differences in verify.verify(command.folder, command.parts, EVERY_SWEEP):

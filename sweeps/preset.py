@@ -1,8 +1,8 @@
 """What a study's environments are made from: a table of the paper's parameters, or a file of what differs from it.
 
-A file is what `jrcjax.load_params` reads, such as `python -m jrcjax.nuscenes` writes. Its numbers replace the paper's
-in the target environment and in the source environment alike, but for the traffic density: the file's is the target's,
-and the source has twice as much, as in Table I. A figure's own parameter replaces the file's.
+A file is what `jrcjax.load_params` reads, such as `python -m jrcjax.config.nuscenes` writes. Its numbers replace the
+paper's in the target environment and in the source environment alike, but for the traffic density: the file gives the
+target's, and the source has twice as much, as in Table I. A figure's own parameter replaces the file's.
 
 A preset is a string: one of `PRESETS`, or the text of a file, so that workers and whoever verifies results have all
 that it says.
@@ -16,9 +16,10 @@ from pathlib import Path
 from typing import Any
 
 from jrcjax.checks import is_positive, refuse, require
-from jrcjax.params import EnvParams
-from jrcjax.params_file import description_of, params_of, text_of
-from jrcjax.presets import ENVIRONMENTS, MAX_DENSITY, PRESETS, paper_params
+from jrcjax.config.toml import description_of, params_of, text_of
+from jrcjax.model.params import EnvParams
+from jrcjax.model.presets import ENVIRONMENTS, PRESETS, paper_params
+from jrcjax.radar.paper import MAX_DENSITY
 
 _ALLOWED = f"{', '.join(PRESETS)}, or a file that ends in .toml"
 _SOURCE_DENSITY = 2.0

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from jrcjax.checks import require_integer
-from jrcjax.hparams import Config, HParams
-from jrcjax.params import EnvParams
-from jrcjax.presets import PRESETS
+from jrcjax.learners.hparams import Config, HParams
+from jrcjax.model.params import EnvParams
+from jrcjax.model.presets import PRESETS
 from jrcjax.types import choice
 from sweeps.preset import check_preset
 
@@ -39,9 +39,9 @@ class Sweep:
     source_points: tuple[int, ...] = ()
     """Number of the source's point at each point; the first everywhere if empty."""
     optimiser: str = Config.optimiser  # pyright: ignore[reportAssignmentType]
-    """One of jrcjax.hparams.OPTIMISERS, of the learners and of the source agents' sweep alike."""
+    """One of jrcjax.learners.hparams.OPTIMISERS, of the learners and of the source agents' sweep alike."""
     recipe: Any = None
-    """What a sweep of one's own is made from (`sweeps.custom.Options`), so that its results can be verified."""
+    """What a sweep of one's own is made from (`sweeps.studies.custom.Options`), so that its results can be verified."""
     seeds_per_part: int = 16
     """Seeds that share a part file. With few points more of them fill the blocks that devices work on."""
 

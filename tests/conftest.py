@@ -5,14 +5,14 @@ Two CPU devices, so that what is sharded over devices is sharded in the tests, t
 
 import jax
 import jax.numpy as jnp
+import numpy_model
 import pytest
-import reference
 
 import jrcjax
-from jrcjax import parallel
-from jrcjax.channel import Channel
-from jrcjax.params import EnvParams, make_factor
-from jrcjax.radar import make_radar
+from jrcjax.model.channel import Channel
+from jrcjax.model.params import EnvParams, make_factor
+from jrcjax.radar.modes import make_radar
+from jrcjax.training import parallel
 
 jax.config.update("jax_num_cpu_devices", 2)  # nothing above makes an array
 parallel.keep_compiled()  # most of the time goes into compiling, often of what another process compiled before
@@ -23,7 +23,7 @@ RANDOM_SEEDS = (0, 1, 2)
 
 def random_params(seed: int) -> EnvParams:
     """A valid environment with 2 or 3 levels per factor, 3 rates and 3 radar modes; persistence from seed 1 on."""
-    described = reference.random_description(seed)
+    described = numpy_model.random_description(seed)
     as_float = lambda value: jnp.asarray(value, jnp.float32)  # noqa: E731
     channel = described["channel"]
     factors = {name: make_factor(**described[name]) for name in ("road", "weather", "speed", "nearby")}

@@ -1,38 +1,22 @@
 """What is refused: with which words, and before anything compiles."""
 
 import dataclasses
-from contextlib import contextmanager
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from compiling import nothing_compiles
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import jrcjax
 from jrcjax import check_params, paper_params, radar
+from jrcjax.radar import bank
 from jrcjax.types import COUNT_MODELS, COUNTING_RULES, DISTANCES, PLACEMENTS
 
 FACTORS = ("road", "weather", "speed", "nearby")
 SETTINGS = settings(max_examples=60, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
-
-
-@contextmanager
-def nothing_compiles():
-    compiled = []
-
-    def listen(event, _, fun_name="", **__):
-        # The first array of a shape compiles its own transfer, in no time.
-        if "backend_compile" in event and fun_name not in ("jit(stage)", "jit(convert_element_type)"):
-            compiled.append(fun_name)
-
-    jax.monitoring.register_event_duration_secs_listener(listen)
-    try:
-        yield
-    finally:
-        jax.monitoring.unregister_event_duration_listener(listen)
-    assert not compiled
 
 
 def put(params, field, value):
@@ -207,7 +191,7 @@ def test_valid_random_parameters_pass(masses, events, persistence, density, weig
     params = put(params, "speed.persistence", np.float32(persistence))
     params = put(params, "radar.density", np.float32(max(density, 0.51)))
     # Stands for the bank that `replace` would build, which takes a second.
-    params = put(params, "radar.bank_inputs", radar.bank_inputs(params.radar))
+    params = put(params, "radar.bank_inputs", bank.bank_inputs(params.radar))
     params = put(params, "reward_weights", np.asarray(weights, np.float32))
     params = put(params, "max_steps_in_episode", limit)
     with nothing_compiles():

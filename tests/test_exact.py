@@ -4,10 +4,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from reference import Model, policy_iteration, stationary
+from numpy_model import Model, policy_iteration, stationary
 from significance import ALPHA, mean_differs
 
-from jrcjax import exact, metrics, slot
+from jrcjax import exact
+from jrcjax.model import metrics, slot
 from jrcjax.types import EVENT_MODELS, MISS_CONVENTIONS
 
 EPS = float(np.finfo(np.float32).eps)

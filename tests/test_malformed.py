@@ -8,17 +8,18 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from compiling import nothing_compiles
 from rich.console import Console
-from test_checks import nothing_compiles
 
 import jrcjax
 from benchmarks.__main__ import main as benchmarks_main
-from jrcjax import exact, memory, radar
-from jrcjax.hparams import check_config, check_hparams
+from jrcjax import exact, radar
+from jrcjax.learners.hparams import check_config, check_hparams
+from jrcjax.training import footprint
 from paper_figs.__main__ import main as figures_main
 from sweeps.__main__ import main as sweeps_main
-from sweeps.registry import SWEEPS
-from sweeps.run import run_sweep
+from sweeps.engine.run import run_sweep
+from sweeps.studies.registry import SWEEPS
 from sweeps.sweep import Size
 
 NAN, INF = float("nan"), float("inf")
@@ -53,8 +54,8 @@ class Malformed:
         self.fields = sorted(leaves_of(target))
         self.env = jrcjax.JRCEnv(target)
         for name in ("ddqn", "tlwd"):  # estimates use small constants, such as the features of states
-            learner = jrcjax.episodes.learner_for(name, target, jrcjax.Config())
-            memory.agent_bytes(learner, jrcjax.episodes.spec_of(target), jrcjax.Config())
+            learner = jrcjax.training.rollout.learner_for(name, target, jrcjax.Config())
+            footprint.agent_bytes(learner, jrcjax.training.rollout.spec_of(target), jrcjax.Config())
         self.file = tmp_path / "file"
         self.file.write_text("")
 
@@ -279,11 +280,11 @@ def test_there_are_a_thousand_of_them():
 
 def test_what_fits_into_memory_is_not_refused(target, monkeypatch):
     """The estimate decides, and not the bound that saves the tracing."""
-    spec, config = jrcjax.episodes.spec_of(target), jrcjax.Config()
-    learner = jrcjax.episodes.learner_for("ddqn", target, config)
-    one = memory.agent_bytes(learner, spec, config)
+    spec, config = jrcjax.training.rollout.spec_of(target), jrcjax.Config()
+    learner = jrcjax.training.rollout.learner_for("ddqn", target, config)
+    one = footprint.agent_bytes(learner, spec, config)
     assert 8 * config.replay_capacity <= one <= 16 * config.replay_capacity
-    monkeypatch.setattr(memory, "physical_memory", lambda: 20 * one)
-    memory.check_memory(learner, spec, config, agents=10)
+    monkeypatch.setattr(footprint, "physical_memory", lambda: 20 * one)
+    footprint.check_memory(learner, spec, config, agents=10)
     with pytest.raises(ValueError, match=r"^config\.replay_capacity: '50000'; allowed: .* GiB for 11 agents"):
-        memory.check_memory(learner, spec, config, agents=11)
+        footprint.check_memory(learner, spec, config, agents=11)

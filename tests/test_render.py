@@ -8,9 +8,10 @@ from matplotlib.collections import PatchCollection
 from tiny import tiny_params
 
 import jrcjax
-from jrcjax import render, slot
-from jrcjax.detection import merged_objects
-from jrcjax.placement import Footprints
+from jrcjax import render
+from jrcjax.model import slot
+from jrcjax.radar.detection import merged_objects
+from jrcjax.radar.placement import Footprints
 
 
 def words_of(seed):

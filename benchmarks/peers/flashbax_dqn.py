@@ -42,7 +42,7 @@ def _setup(agents: int, steps: int, method: Any) -> Ready:
 
     import jrcjax
     from benchmarks.ours import compiled
-    from jrcjax.schedules import epsilon
+    from jrcjax.learners.schedules import epsilon
 
     env, params = jrcjax.JRCEnv(), jrcjax.paper_params("source")
     hparams, config = jrcjax.HParams(), jrcjax.Config()
@@ -105,7 +105,7 @@ def _uniform(network, optimiser, hparams, config):
     import jax.numpy as jnp
     import optax
 
-    from jrcjax.value_learning import double_q_value, squared_td_loss, td_target
+    from jrcjax.learners.value_learning import double_q_value, squared_td_loss, td_target
 
     sizes = (config.replay_capacity, 1, config.batch_size)
     buffer = fbx.make_item_buffer(*sizes)
@@ -138,7 +138,7 @@ def _prioritised(network, optimiser, hparams, config):
     import jax.numpy as jnp
     import optax
 
-    from jrcjax.value_learning import double_q_value, l2_loss, large_margin_loss, td_target
+    from jrcjax.learners.value_learning import double_q_value, l2_loss, large_margin_loss, td_target
 
     sizes = (config.replay_capacity, 1, config.batch_size)
     exponent = float(hparams.priority_exponent)

@@ -16,7 +16,7 @@ import importlib
 import importlib.util
 from typing import TYPE_CHECKING, Any
 
-from jrcjax.presets import ENVIRONMENTS
+from jrcjax.model.presets import ENVIRONMENTS
 
 if TYPE_CHECKING:
     from jrcjax.adapters.five_tuple import FiveTupleEnv

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from jrcjax.adapters.gymnax_env import GymnaxEnv
-from jrcjax.environment import EnvState
-from jrcjax.params import EnvParams
+from jrcjax.model.environment import EnvState
+from jrcjax.model.params import EnvParams
 from jrcjax.types import Bool, Float, Int, Key
 
 

@@ -9,9 +9,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jrcjax import slot, states
-from jrcjax.params import EnvParams, check_params
-from jrcjax.presets import paper_params
+from jrcjax.model import slot, states
+from jrcjax.model.params import EnvParams, check_params
+from jrcjax.model.presets import paper_params
 
 _WORDS_AT_ONCE = 1024  # slots whose random words are drawn together
 

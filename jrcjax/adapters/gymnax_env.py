@@ -6,8 +6,8 @@ from typing import Any
 
 import jax.numpy as jnp
 
-from jrcjax.environment import JRCEnv
-from jrcjax.params import EnvParams
+from jrcjax.model.environment import JRCEnv
+from jrcjax.model.params import EnvParams
 
 
 class GymnaxEnv(JRCEnv):

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Hashable
 
 from jrcjax.checks import refuse
-from jrcjax.hparams import Config
 from jrcjax.learners.base import Learner, LearnerFactory, Source, Spec
 from jrcjax.learners.ddqn import ddqn, dpr
+from jrcjax.learners.hparams import Config
 from jrcjax.learners.q_learning import q_learning
 from jrcjax.learners.round_robin import round_robin
 from jrcjax.learners.tlwd import tlwd

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from jrcjax.hparams import Config, HParams
-from jrcjax.n_step import NStepTransition
-from jrcjax.replay import Transition
+from jrcjax.learners.hparams import Config, HParams
+from jrcjax.replay.n_step import NStepTransition
+from jrcjax.replay.uniform import Transition
 from jrcjax.types import Float, Int, Key, Words
 
 State = Any

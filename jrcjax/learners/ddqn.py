@@ -8,14 +8,17 @@ import jax
 import jax.numpy as jnp
 import optax
 
-from jrcjax import exploration, replay, states
-from jrcjax.hparams import Config, HParams, optimiser_of
+from jrcjax.learners import exploration
 from jrcjax.learners.base import Learner, Source, Spec
+from jrcjax.learners.hparams import Config, HParams, optimiser_of
 from jrcjax.learners.q_function import QFunction, copied_if, q_function
-from jrcjax.replay import Transition
-from jrcjax.schedules import epsilon
+from jrcjax.learners.schedules import epsilon
+from jrcjax.learners.value_learning import squared_td_loss, td_target
+from jrcjax.model import states
+from jrcjax.policies import greedy_policy
+from jrcjax.replay import uniform
+from jrcjax.replay.uniform import Transition
 from jrcjax.types import Float, Int, Words
-from jrcjax.value_learning import greedy_policy, squared_td_loss, td_target
 
 
 class DDQNState(NamedTuple):
@@ -41,11 +44,11 @@ def ddqn(spec: Spec, config: Config) -> Learner:
     """Double DQN with uniform replay."""
     function = q_function(spec, config)
     optimiser = optimiser_of(config)
-    where = replay.layout(states.num_states(spec.shape), spec.num_actions)
+    where = uniform.layout(states.num_states(spec.shape), spec.num_actions)
 
     def init(key, hparams: HParams, source: Source | None = None) -> DDQNState:
         weights = function.init(key)
-        ring = replay.init(config.replay_capacity, where)
+        ring = uniform.init(config.replay_capacity, where)
         # Algorithm 1 starts both networks at random; equal weights spare the first period an arbitrary target.
         return DDQNState(weights, function.target_of(weights), optimiser.init(weights), ring)
 
@@ -53,11 +56,11 @@ def ddqn(spec: Spec, config: Config) -> Learner:
         return exploration.epsilon_greedy(words, function.of_state(state.weights, state_id), epsilon(slot, hparams))
 
     def draw(words: Words, slots: Int) -> Int:
-        return replay.draw(words, slots[:, None] + 1, config.replay_capacity)
+        return uniform.draw(words, slots[:, None] + 1, config.replay_capacity)
 
     def update(state: DDQNState, transition: Transition, slot, positions: Int, hparams: HParams) -> DDQNState:
-        ring = replay.add(state.ring, transition, slot, where)
-        batch = replay.at(ring, positions, where)
+        ring = uniform.add(state.ring, transition, slot, where)
+        batch = uniform.at(ring, positions, where)
         # After every target_period updates theta' <- theta. Done at the start of the slot that follows, whose table
         # is needed anyway.
         due = slot % hparams.target_period == 0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from jrcjax import exploration
+from jrcjax.learners import exploration
 from jrcjax.learners.base import Learner
 from jrcjax.types import Float
 

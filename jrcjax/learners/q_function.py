@@ -13,12 +13,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jrcjax import states
-from jrcjax.hparams import Config
 from jrcjax.learners.base import Spec
-from jrcjax.networks import QNetwork
+from jrcjax.learners.hparams import Config
+from jrcjax.learners.networks import QNetwork
+from jrcjax.learners.value_learning import double_q_value
+from jrcjax.model import states
 from jrcjax.types import Float, Int, Key
-from jrcjax.value_learning import double_q_value
 
 
 class QFunction(NamedTuple):

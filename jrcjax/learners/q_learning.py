@@ -6,14 +6,15 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 
-from jrcjax import exploration
-from jrcjax.hparams import Config, HParams
+from jrcjax.learners import exploration
 from jrcjax.learners.base import Learner, Spec
-from jrcjax.replay import Transition
-from jrcjax.schedules import epsilon
-from jrcjax.states import num_states
+from jrcjax.learners.hparams import Config, HParams
+from jrcjax.learners.schedules import epsilon
+from jrcjax.learners.value_learning import q_learning_error, robbins_monro_step
+from jrcjax.model.states import num_states
+from jrcjax.policies import greedy_policy
+from jrcjax.replay.uniform import Transition
 from jrcjax.types import Float, Int
-from jrcjax.value_learning import greedy_policy, q_learning_error, robbins_monro_step
 
 
 class QState(NamedTuple):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import jax.numpy as jnp
 
-from jrcjax.hparams import Config
 from jrcjax.learners.base import Learner, Spec
-from jrcjax.states import num_states
+from jrcjax.learners.hparams import Config
+from jrcjax.model.states import num_states
 
 
 def round_robin(spec: Spec, config: Config) -> Learner:

@@ -13,17 +13,21 @@ import jax
 import jax.numpy as jnp
 import optax
 
-from jrcjax import exploration, n_step, prioritised_replay, rng, states
+from jrcjax import rng
 from jrcjax.checks import refuse
-from jrcjax.hparams import Config, HParams, optimiser_of
+from jrcjax.learners import exploration
 from jrcjax.learners.base import Learner, Source, Spec
+from jrcjax.learners.hparams import Config, HParams, optimiser_of
 from jrcjax.learners.q_function import QFunction, copied_if, q_function
-from jrcjax.n_step import NStepTransition
-from jrcjax.prioritised_replay import Memory, Sample
-from jrcjax.replay import Transition
-from jrcjax.schedules import epsilon, importance_exponent
+from jrcjax.learners.schedules import epsilon, importance_exponent
+from jrcjax.learners.value_learning import l2_loss, large_margin_loss, td_target
+from jrcjax.model import states
+from jrcjax.policies import greedy_policy
+from jrcjax.replay import n_step, prioritised
+from jrcjax.replay.n_step import NStepTransition
+from jrcjax.replay.prioritised import Memory, Sample
+from jrcjax.replay.uniform import Transition
 from jrcjax.types import Float, Int, Words
-from jrcjax.value_learning import greedy_policy, l2_loss, large_margin_loss, td_target
 
 
 class TLwDState(NamedTuple):
@@ -80,7 +84,7 @@ def tlwd(spec: Spec, config: Config) -> Learner:
         refuse("config.demonstrations", config.demonstrations, allowed)
     function = q_function(spec, config)
     optimiser = optimiser_of(config)
-    where = prioritised_replay.layout(
+    where = prioritised.layout(
         states.num_states(spec.shape), spec.num_actions, config.replay_capacity, config.demonstrations
     )
     updates = config.pretraining + config.episodes * spec.episode_slots
@@ -91,18 +95,16 @@ def tlwd(spec: Spec, config: Config) -> Learner:
 
     def learn(state: TLwDState, words: Words, count: Int, number: Int, target, hparams: HParams) -> TLwDState:
         """Update `number` of all, with `count` new transitions in the memory."""
-        batch = prioritised_replay.sample(state.memory, words, where)
+        batch = prioritised.sample(state.memory, words, where)
         beta = importance_exponent(number, updates, hparams)
-        size = prioritised_replay.size(count, where)
-        importance = prioritised_replay.importance_weights(batch.probability, size, beta)
+        size = prioritised.size(count, where)
+        importance = prioritised.importance_weights(batch.probability, size, beta)
         gradient, td_error = jax.grad(loss, has_aux=True)(state.weights, target, batch, importance, hparams)
         step, optimiser_state = optimiser.step(gradient, state.optimiser, state.weights, hparams)
-        priority = prioritised_replay.priority(
+        priority = prioritised.priority(
             td_error, batch.is_demonstration, hparams.priority_constant, hparams.demonstration_constant
         )
-        memory = prioritised_replay.set_priorities(
-            state.memory, batch.indices, priority, hparams.priority_exponent, where
-        )
+        memory = prioritised.set_priorities(state.memory, batch.indices, priority, hparams.priority_exponent, where)
         return TLwDState(optax.apply_updates(state.weights, step), target, optimiser_state, memory, state.window)
 
     def copied(state: TLwDState, slot: Int, hparams: HParams):
@@ -114,7 +116,7 @@ def tlwd(spec: Spec, config: Config) -> Learner:
         """Lines 7 to 14 of Algorithm 2."""
 
         def one(state, i):
-            shape = (prioritised_replay.NUM_WORDS, config.batch_size)
+            shape = (prioritised.NUM_WORDS, config.batch_size)
             words = rng.bits(jax.random.fold_in(key, i), shape)
             return learn(state, words, jnp.int32(0), i, copied(state, i, hparams), hparams), None
 
@@ -124,7 +126,7 @@ def tlwd(spec: Spec, config: Config) -> Learner:
     def init(key, hparams: HParams, source: Source | None = None) -> TLwDState:
         assert source is not None
         weights = copied_if(hparams.initial_weights == 1, source.weights, function.init(key))
-        memory = prioritised_replay.init(source.demonstrations, where)
+        memory = prioritised.init(source.demonstrations, where)
         window = n_step.init(config.n_step)
         state = TLwDState(weights, function.target_of(weights), optimiser.init(weights), memory, window)
         return pretrain(state, jax.random.fold_in(key, 1), hparams)
@@ -137,14 +139,14 @@ def tlwd(spec: Spec, config: Config) -> Learner:
         window = n_step.push(state.window, transition, slot % spec.episode_slots, hparams.discount)
         complete = slot + 1 - config.n_step
         oldest = jax.tree.map(lambda field: field[0], window)
-        memory = prioritised_replay.add(state.memory, oldest, complete, where)
+        memory = prioritised.add(state.memory, oldest, complete, where)
         state = state._replace(memory=memory, window=window)
-        words = words.reshape(prioritised_replay.NUM_WORDS, config.batch_size)
+        words = words.reshape(prioritised.NUM_WORDS, config.batch_size)
         count = jnp.maximum(complete + 1, 0)
         return learn(state, words, count, config.pretraining + slot, copied(state, slot, hparams), hparams)
 
     return Learner(
-        num_words=exploration.NUM_WORDS + prioritised_replay.NUM_WORDS * config.batch_size,
+        num_words=exploration.NUM_WORDS + prioritised.NUM_WORDS * config.batch_size,
         init=init,
         act=act,
         update=update,

@@ -1,0 +1,1 @@
+"""Trained agents away from their training, and their files."""

@@ -1,0 +1,1 @@
+"""Environments and hyperparameters as text: TOML files, dotted names, the reference page."""

@@ -1,0 +1,107 @@
+"""The configuration reference, made from the classes: `python -m jrcjax.config.document` writes CONFIGURATION.md.
+
+What a field means is the docstring under it, which Python itself drops, so it comes from the source.
+"""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import inspect
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jrcjax.learners.hparams import Config, HParams
+from jrcjax.model.params import FACTORS, EnvParams
+from jrcjax.model.presets import ENVIRONMENTS, paper_params
+from jrcjax.types import READINGS
+
+PATH = Path(__file__).with_name("CONFIGURATION.md")
+_MOST_NUMBERS = 12  # that are shown of an array
+_INTRODUCTION = """\
+# Configuration
+
+Every setting with its type, its value in Table I, and its meaning. Made from the classes by
+`python -m jrcjax.config.document`; do not edit it.
+
+Types: float and int are arrays of one number, or of one per level [J], data rate [L], radar mode [K], ...; all of them
+may be traced and vmapped over. What is static decides shapes or code. In a parameter file (`jrcjax.load_params`) fields
+have these names, and readings go by name. In `python -m sweeps run custom --vary PATH=VALUES` a path is `env.` or
+`hparams.`, the dotted field, and an index for each axis: `env.speed.event_probability.1`, or `.high` where there are
+two levels. `env.all.prior.0` is that entry of every factor.
+"""
+
+
+def fields_of(kind: type) -> dict[str, str]:
+    """Field to the docstring under it, in one line, for a class whose fields all have one or tell by their type."""
+    body = ast.parse(inspect.getsource(kind)).body[0]
+    assert isinstance(body, ast.ClassDef)
+    found: dict[str, str] = {}
+    for node, below in zip(body.body, [*body.body[1:], None], strict=True):
+        if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
+            text = below.value.value if isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant) else ""
+            found[node.target.id] = " ".join(str(text).split())
+    return found
+
+
+def _type_of(value: Any, annotation: str) -> str:
+    """float, int, or the annotation of what is static."""
+    if hasattr(value, "dtype"):
+        return "int" if np.issubdtype(value.dtype, np.integer) else "float"
+    return f"{annotation}, static"
+
+
+def _shown(value: Any, readings: tuple[str, ...] = ()) -> str:
+    """A value as a person writes it."""
+    if readings:
+        return f"{int(value)} ({readings[int(value)]})"
+    if isinstance(value, str | int):
+        return str(value)
+    array = np.asarray(value)
+    if array.size > _MOST_NUMBERS:
+        return f"{' x '.join(map(str, array.shape))} numbers"
+    if array.ndim > 1:
+        return "; ".join(map(_shown, array))
+    return ", ".join(f"{number:.6g}" for number in np.atleast_1d(array))
+
+
+def _table(kind: type, instances: dict[str, Any]) -> list[str]:
+    """The rows of one class's fields that hold values, with a column for each instance."""
+    meanings = fields_of(kind)
+    lines = [f"| field | type | {' | '.join(instances)} | meaning |", f"|---|---|{'---|' * len(instances)}---|"]
+    for field in dataclasses.fields(kind):
+        values = [getattr(instance, field.name) for instance in instances.values()]
+        if dataclasses.is_dataclass(values[0]):
+            continue
+        shown = [_shown(value, READINGS.get(field.name, ())) for value in values]
+        cells = (f"`{field.name}`", _type_of(values[0], str(field.type)), *shown, meanings[field.name])
+        lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    return lines
+
+
+def _section(title: str, kind: type, instances: dict[str, Any]) -> list[str]:
+    summary = (inspect.getdoc(kind) or "").split("\n\n")[0].replace("\n", " ")
+    return [f"## {title}", "", summary, "", *_table(kind, instances), ""]
+
+
+def reference() -> str:
+    """The whole page."""
+    both = {name: paper_params(name) for name in ENVIRONMENTS}
+    lines = [*_INTRODUCTION.splitlines(), "", *_section("EnvParams", EnvParams, both)]
+    for part in (*FACTORS, "radar"):
+        parts = {name: getattr(params, part) for name, params in both.items()}
+        kind = type(parts["source"])
+        lines += _section(f"EnvParams.{part}: {kind.__name__}", kind, parts)
+    lines += _section("HParams", HParams, {"default": HParams()})
+    lines += _section("Config", Config, {"default": Config()})
+    lines += ["## Readings", "", "Fields that are the index of a reading.", "", "| field | readings |", "|---|---|"]
+    for field, names in READINGS.items():
+        lines.append(f"| `{field}` | {', '.join(f'{i} {name}' for i, name in enumerate(names))} |")
+    return "\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    PATH.write_text(reference())
+    print(PATH)

@@ -1,0 +1,144 @@
+"""The agent axis on all cores: blocks of fixed size, sharded over one device per core.
+
+XLA runs one batched program on a CPU mostly on one core. With one device per core and the agents shared between them
+both cores work, and blocks of fixed size keep each block's memory in the cache and its compiled code the same whatever
+the number of agents.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.sharding import AxisType, Mesh, PartitionSpec
+
+from jrcjax.checks import refuse
+from jrcjax.machine import usable_cores
+
+BLOCK = 16
+"""Agents that one device advances at once."""
+_XLA_FLAGS = {
+    # Loops over 24 or 32 numbers stay loops, which LLVM turns into vector instructions; unrolled they would be scalar.
+    # What several loops read is computed once, in one loop with several results.
+    "--xla_backend_extra_options": "-unroll-full-max-count=8,xla_cpu_use_multi_output_fusion=true",
+    "--xla_cpu_prefer_vector_width": "512",
+    # Each core has a device, so nothing is gained by handing half of a loop of some microseconds to another thread.
+    "--xla_disable_hlo_passes": "cpu-parallel-task-assigner",
+}
+
+
+def use_all_cores() -> None:
+    """Makes one JAX device per core, at least two, and lets XLA use the cores' vector instructions.
+
+    XLA compiles other code for a single device, which rounds differently; with two on one core numbers are those of
+    any other number of cores. Call it before any array is made; on an accelerator it changes nothing. Flags that
+    XLA_FLAGS has already are left.
+    """
+    given = os.environ.get("XLA_FLAGS", "")
+    added = [f"{name}={value}" for name, value in _XLA_FLAGS.items() if name not in given]
+    os.environ["XLA_FLAGS"] = " ".join([given, *added]).strip()
+    jax.config.update("jax_num_cpu_devices", max(usable_cores(), 2))
+
+
+def keep_compiled() -> None:
+    """Keeps compiled programs on disk, so that a second run starts in seconds.
+
+    The folder is `jrcjax` in XDG_CACHE_HOME, or in ~/.cache; JAX_COMPILATION_CACHE_DIR overrules it.
+    """
+    if jax.config.jax_compilation_cache_dir is None:  # pyright: ignore[reportAttributeAccessIssue]
+        base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+        jax.config.update("jax_compilation_cache_dir", str(Path(base) / "jrcjax"))
+        # A command compiles a hundred small programs, too, which take two seconds together.
+        jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+
+
+def mesh() -> Mesh:
+    """All devices along one axis of agents."""
+    return Mesh(np.array(jax.devices()), ("agents",), axis_types=(AxisType.Auto,))
+
+
+def padded(count: int, block: int = BLOCK) -> int:
+    """The number of agents that `over_agents` works with for `count` of them: a multiple of block times devices."""
+    unit = block * jax.device_count()
+    return -(-count // unit) * unit
+
+
+def pad_agents(tree: Any, count: int) -> Any:
+    """Repeats the last agent along the leading axis of every leaf up to `count` agents."""
+
+    def pad(leaf: jax.Array) -> jax.Array:
+        return jnp.concatenate([leaf, jnp.repeat(leaf[-1:], count - leaf.shape[0], axis=0)])
+
+    return jax.tree.map(pad, tree)
+
+
+def groups(tree: Any) -> list[Any]:
+    """Agents in groups that give each device one block, the last of them padded by `pad_agents`.
+
+    A function compiled for such a group is the same code for any number of agents, and so are an agent's bits.
+    """
+    count, size = jax.tree.leaves(tree)[0].shape[0], padded(1)
+    whole = pad_agents(tree, padded(count))
+    return [jax.tree.map(lambda leaf, i=i: leaf[i : i + size], whole) for i in range(0, padded(count), size)]
+
+
+def over_agents(function: Callable, block: int = BLOCK, *, in_place: bool = False) -> Callable:
+    """`function(shared, agents)` of one agent as a compiled function of many.
+
+    Args:
+      function: pure; `shared` is the same for all agents, `agents` a pytree of one agent's values.
+      block: agents that one device advances at once; more of them for functions that do little per agent.
+      in_place: for a function that returns (agents, result): the new agents take the memory of the old ones, which are
+        gone after the call.
+
+    Returns:
+      A function of the same arguments, every leaf of `agents` and of the result with a leading axis of agents, whose
+      length must be a multiple of `block` times the number of devices (see `padded`); otherwise it raises ValueError.
+    """
+    along, everywhere = PartitionSpec("agents"), PartitionSpec()
+    of_block = jax.vmap(function, in_axes=(None, 0))
+
+    def on_one_device(shared, agents):
+        blocks = jax.tree.leaves(agents)[0].shape[0] // block
+        # A single block needs no loop, which would copy the agents' memory in and out.
+        if blocks == 1:
+            return of_block(shared, agents)
+        if in_place:
+            return _in_place(of_block, shared, agents, blocks)
+        split = jax.tree.map(lambda a: a.reshape(blocks, block, *a.shape[1:]), agents)
+        return _joined(jax.lax.map(lambda agents: of_block(shared, agents), split))
+
+    devices = jax.device_count()
+    sharded = jax.shard_map(on_one_device, mesh=mesh(), in_specs=(everywhere, along), out_specs=along, check_vma=False)
+
+    def checked(shared, agents):
+        count = jax.tree.leaves(agents)[0].shape[0]
+        if count % (block * devices):
+            refuse("agents", count, f"a multiple of {block} agents x {devices} devices")
+        return sharded(shared, agents)
+
+    return jax.jit(checked, donate_argnums=1 if in_place else ())
+
+
+def _joined(blocks: Any) -> Any:
+    return jax.tree.map(lambda a: a.reshape(-1, *a.shape[2:]), blocks)
+
+
+def _in_place(of_block: Callable, shared: Any, agents: Any, blocks: int) -> tuple[Any, Any]:
+    """One block after the other, each written over what it was."""
+
+    def one(agents, i):
+        def here(a):
+            return i * (a.shape[0] // blocks)
+
+        old = jax.tree.map(lambda a: jax.lax.dynamic_slice_in_dim(a, here(a), a.shape[0] // blocks), agents)
+        new, result = of_block(shared, old)
+        return jax.tree.map(lambda a, b: jax.lax.dynamic_update_slice_in_dim(a, b, here(a), 0), agents, new), result
+
+    agents, results = jax.lax.scan(one, agents, jnp.arange(blocks))
+    return agents, _joined(results)

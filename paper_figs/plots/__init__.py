@@ -1,0 +1,1 @@
+"""Pictures of tables: style, learning curves, points."""

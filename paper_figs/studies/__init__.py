@@ -1,0 +1,1 @@
+"""What studies of many seeds or readings conclude: tables and figures from their results."""

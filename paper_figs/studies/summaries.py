@@ -1,0 +1,77 @@
+"""The summaries of studies: small CSV and JSON files and figures, from results alone."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pandas as pd
+
+from paper_figs.plots import style
+from paper_figs.studies import multiverse, robustness
+from sweeps.results import store
+from sweeps.studies.multiverse import LEVELS, MULTIVERSE, UNIVERSES, grouped
+from sweeps.studies.robustness import SOURCE, TARGET
+from sweeps.sweep import Size, Sweep
+
+HEADLINE = "C5 (highest)"
+"""The claim whose specification curve is drawn as a picture of its own."""
+
+
+def _write(folder: Path, tables: dict[str, pd.DataFrame]) -> list[Path]:
+    paths = [folder / f"{name}.csv" for name in tables]
+    for path, table in zip(paths, tables.values(), strict=True):
+        table.to_csv(path, index=False, float_format="%.6g")
+    return paths
+
+
+def _manifests(folder: Path, sweeps: tuple[Sweep, ...], out: Path) -> Path:
+    """What reproduces the summary: the manifests of all results that it rests on."""
+    path = folder / "manifests.json"
+    all_sweeps = [part for sweep in sweeps for part in (sweep, sweep.source) if part]
+    found = {sweep.name: json.loads((out / sweep.name / store.MANIFEST).read_text()) for sweep in all_sweeps}
+    path.write_text(json.dumps(found, indent=1) + "\n")
+    return path
+
+
+def summarise_robustness(sweeps: tuple[Sweep, ...], size: Size, out: Path) -> list[Path]:
+    """Tables and the figure of a robustness study, in OUT/robustness/summary."""
+    folder = out / "robustness" / "summary"
+    folder.mkdir(parents=True, exist_ok=True)
+    results = {"source": store.load(out / SOURCE.name, size.seeds), "target": store.load(out / TARGET.name, size.seeds)}
+    tables = robustness.tables(results)
+    pictures = style.save(robustness.draw(tables), folder / "robustness")
+    return [*_write(folder, tables), *pictures, _manifests(folder, sweeps, out)]
+
+
+def summarise_multiverse(sweeps: tuple[Sweep, ...], size: Size, out: Path) -> list[Path]:
+    """Tables and figures of a multiverse, in OUT/multiverse/summary; specifications.pdf has a page per claim."""
+    folder = out / "multiverse" / "summary"
+    folder.mkdir(parents=True, exist_ok=True)
+    results, universes = {}, {}
+    for sweep in sweeps:
+        assert sweep.source
+        results[sweep.name] = tuple(store.load(out / part.name, size.seeds) for part in (sweep.source, sweep))
+        universes[sweep.name] = grouped(UNIVERSES)[sweep.optimiser][: len(sweep.source.x_values)]
+    found = multiverse.verdicts(results, universes)
+    effects = multiverse.main_effects(found)
+    shares = multiverse.shares(found, effects)
+    tables = {
+        "universes": found[["universe", *LEVELS]].drop_duplicates(),
+        "verdicts": found.drop(columns=[*LEVELS, "relation", "limit"]),
+        "main_effects": effects,
+        "claims": shares,
+    }
+    pictures = style.save(multiverse.draw_shares(shares, size.seeds), folder / "multiverse")
+    pictures += style.save(multiverse.draw_specification(found, HEADLINE), folder / "specification")
+    pages = (multiverse.draw_specification(found, claim) for claim in shares.claim)
+    pictures.append(style.save_pages(pages, folder / "specifications.pdf"))
+    return [*_write(folder, tables), *pictures, _manifests(folder, sweeps, out)]
+
+
+SUMMARIES: dict[str, Callable[[tuple[Sweep, ...], Size, Path], list[Path]]] = {
+    "robustness": summarise_robustness,
+    MULTIVERSE.name: summarise_multiverse,
+}
+"""By the name of the study."""

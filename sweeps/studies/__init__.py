@@ -1,0 +1,1 @@
+"""What is run: the constants of each sweep and study."""

@@ -1,0 +1,172 @@
+"""The report: whole, self-contained, valid, and no wider than the screen it is read on."""
+
+import dataclasses
+import html.parser
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from paper_figs import report
+from paper_figs.claims.judge import Judgement
+from paper_figs.figures import FIGURES
+from sweeps.sweep import SMOKE, Size
+
+REFERENCE = Path(report.__file__).parents[1] / "published" / "figures"
+VOID = {"img", "meta", "link", "br", "hr", "input"}
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+
+
+def judgements():
+    rows = json.loads((REFERENCE / "claims.json").read_text())
+    return [Judgement(**row) for row in rows]
+
+
+def sweep_data(x_values):
+    variables = {f"optimum_{name}": (("point",), np.array(x_values) + 1.0) for name in report._OPTIMUM}
+    coords = {"point": range(len(x_values)), "favourable_probability": ("point", x_values), "seed": [0]}
+    return xr.Dataset(variables, coords)
+
+
+@pytest.fixture(scope="module")
+def page():
+    claims = [*judgements()]
+    claims[0] = dataclasses.replace(claims[0], value=float("nan"), ci_low=float("nan"), ci_high=float("nan"))
+    return report.render(
+        Size(),
+        {figure.title: REFERENCE / f"{figure.name}.png" for figure in FIGURES},
+        claims,
+        report.optimum_rows("fig7", sweep_data([0.25, 0.75])) + report.optimum_rows("fig5a", sweep_data([0.0])),
+        [{"sweep": "fig6", "algorithm": "dpr", "point": 3, "seed": 41, "episode": 17}],
+        {figure.name: (REFERENCE / f"{figure.name}.manifest.json").read_text() for figure in FIGURES},
+    )
+
+
+class Page(html.parser.HTMLParser):
+    """Elements that are opened and closed in order, ids, links, loaded files, and the text of table rows."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.ids, self.links, self.loaded, self.rows, self.images = [], [], [], [], [], []
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag, attrs):
+        attributes = dict(attrs)
+        self.ids += [attributes["id"]] if "id" in attributes else []
+        if tag == "a":
+            self.links.append(attributes["href"])
+        elif {"src", "href"} & attributes.keys():
+            self.loaded.append(attributes.get("src") or attributes.get("href"))
+        self.images += [attributes] if tag == "img" else []
+        self.rows += [""] if tag == "tr" else []
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if "tr" in self.open:
+            self.rows[-1] += f"{data}|"
+
+
+@pytest.fixture(scope="module")
+def parsed(page):
+    return Page(page)
+
+
+def test_elements_are_closed_and_links_lead_somewhere(parsed):
+    assert parsed.open == []
+    assert len(set(parsed.ids)) == len(parsed.ids)
+    assert {link.removeprefix("#") for link in parsed.links} <= set(parsed.ids)
+
+
+def test_nothing_is_loaded_from_elsewhere(page, parsed):
+    assert all(address.startswith("data:image/png;base64,") for address in parsed.loaded)
+    assert not re.search(r"url\(|@import|<script|<link|https?:", page)
+
+
+def test_every_figure_is_there_with_a_text_in_its_place(parsed):
+    assert [figure.name in parsed.ids for figure in FIGURES] == [True] * len(FIGURES)
+    assert [figure.title in image["alt"] for figure, image in zip(FIGURES, parsed.images, strict=True)] == [True] * 6
+    for figure, image in zip(FIGURES, parsed.images, strict=True):
+        assert len(image["src"]) > (REFERENCE / f"{figure.name}.png").stat().st_size
+        assert int(image["width"]) > int(image["height"]) > 500
+
+
+def test_every_claim_is_there_with_its_verdict_in_words_and_a_link_to_its_figure(parsed):
+    for claim in judgements():
+        row = next(row for row in parsed.rows if row.startswith(f"{claim.claim}|"))
+        assert f"{report.VERDICTS[claim.verdict]} {claim.verdict}|" in row
+        assert claim.statement in row
+    links = [link for link in parsed.links if link in {f"#{figure.name}" for figure in FIGURES}]
+    assert len(links) == len(judgements())
+    assert links[0] == "#fig5a"
+    assert links[-1] == "#fig9"
+    assert len(set(report.VERDICTS.values())) == 3
+
+
+def test_numbers_have_four_digits_and_what_is_missing_is_a_dash(parsed):
+    assert [report._number(value) for value in (-257.8123, 0.03, 4.0, float("nan"))] == [
+        "−257.8",
+        "0.03000",
+        "4.000",
+        "–",
+    ]
+    row = next(row for row in parsed.rows if row.startswith("C1 (reached)|"))
+    assert "|–|– to –|" in row
+
+
+def test_the_optimum_is_told_with_the_value_of_each_point(parsed):
+    assert any("fig7|1|" in row.replace("\n|", "") and "favourable probability = 0.75" in row for row in parsed.rows)
+    assert not any("fig5a" in row and "favourable" in row for row in parsed.rows)
+
+
+def test_settings_and_origin_are_there(page, parsed):
+    text = "\n".join(parsed.rows)
+    assert "speed.event_probability|0.005, 0.1|0.005, 0.4|" in text
+    assert "miss_bank" not in text
+    assert "learning_rate|0.001|" in text
+    assert "priority_exponent|0.4 (fig5a, fig5b, fig6, fig7, fig8); 0.4, 0.0 (fig9)|" in text
+    assert re.search(r"fig6\|\s*\|?dpr\|3\|41\|", text.replace("\n", ""))
+    manifest = json.loads((REFERENCE / "fig6.manifest.json").read_text())
+    assert manifest["git_commit"][:12] in page
+    assert f"jax {manifest['versions']['jax']}" in page
+
+
+@pytest.mark.parametrize(
+    ("size", "command"),
+    [
+        (Size(), "make figures ARGS='--seeds 10 --episodes 1000 --preset paper'"),
+        (SMOKE, "make figures ARGS='--smoke --seeds 2 --episodes 20 --preset paper'"),
+    ],
+)
+def test_the_command_makes_the_page_anew(size, command):
+    assert report._command(size) == command
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+def test_nothing_is_wider_than_the_screen(page, width, tmp_path):
+    browser = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if browser is None:
+        pytest.skip("needs Chromium")
+    (tmp_path / "report.html").write_text(page)
+    # A browser's window has a least width, a frame has none.
+    frame = f'<iframe src="report.html" style="width:{width}px;height:800px;border:0"></iframe>'
+    measure = "const d=document.querySelector('iframe').contentDocument.documentElement;"
+    report_it = "document.title=`${d.clientWidth} ${d.scrollWidth}`"
+    (tmp_path / "frame.html").write_text(f"{frame}<script>onload=()=>{{{measure}{report_it}}}</script>")
+    offline = ("--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-quic")
+    command = [browser, "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--hide-scrollbars", *offline]
+    command += ["--allow-file-access-from-files", f"--user-data-dir={tmp_path / 'profile'}", "--window-size=1400,900"]
+    command += ["--dump-dom", (tmp_path / "frame.html").as_uri()]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+    found = re.search(r"<title>(\d+) (\d+)</title>", done.stdout)
+    assert found, done.stderr[-500:]
+    assert [int(number) for number in found.groups()] == [width, width]

@@ -1,0 +1,90 @@
+"""A sweep on a local Dask cluster gives the bits of a local run, also when it loses a worker."""
+
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from jrcjax import load_agent
+from jrcjax.provenance import command
+from sweeps.__main__ import main
+from sweeps.engine.distributed import share
+from sweeps.results import parts, store
+from sweeps.results.agents import agents_path
+
+ROOT = Path(__file__).parents[2]
+ARGUMENTS = ["run", "fig5a", "--episodes", "2", "--seeds", "160"]
+
+
+@pytest.mark.slow
+def test_a_cluster_that_loses_a_worker_gives_the_results_of_a_local_run(tmp_path):
+    pytest.importorskip("distributed", reason="the extra dask is not installed")
+    import psutil
+
+    command = [sys.executable, "-m", "sweeps", *ARGUMENTS, "--out"]
+    subprocess.run([*command, str(tmp_path / "local")], cwd=ROOT, check=True, capture_output=True)
+    process = subprocess.Popen([*command, str(tmp_path / "dask"), "--workers", "2"], cwd=ROOT, stderr=subprocess.PIPE)
+    while process.poll() is None and not list(tmp_path.glob("dask/fig5a/*.nc")):
+        time.sleep(0.005)
+    assert process.poll() is None, process.communicate()
+    workers = [c for c in psutil.Process(process.pid).children() if "spawn_main" in " ".join(c.cmdline())]
+    assert len(workers) == 2
+    workers[0].kill()
+    _, said = process.communicate()
+    assert process.returncode == 0, said.decode()
+    assert all("sweeps run fig5a" in part.provenance["command"] for part in parts.parts_of(tmp_path / "dask" / "fig5a"))
+    local, dask = (parts.parts_of(tmp_path / name / "fig5a") for name in ("local", "dask"))
+    assert [(part.path.name, part.digest) for part in dask] == [(part.path.name, part.digest) for part in local]
+
+
+@pytest.mark.slow
+def test_a_sweep_that_transfers_runs_on_a_scheduler_that_is_there(tmp_path):
+    distributed = pytest.importorskip("distributed", reason="the extra dask is not installed")
+    transfer = ["run", "fig9", "--smoke", "--episodes", "2", "--save-agents"]
+    # In a process of its own: this one may have compiled for other devices before.
+    local = [sys.executable, "-m", "sweeps", *transfer, "--out", str(tmp_path / "local")]
+    subprocess.run(local, cwd=ROOT, check=True, capture_output=True)
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0") as cluster:
+        there = ["--scheduler", cluster.scheduler_address, "--out", str(tmp_path / "dask")]
+        assert main([*transfer, *there]) == 0  # trains its source agents there
+        shutil.rmtree(tmp_path / "dask" / "fig9")
+        assert main([*transfer, *there]) == 0  # sends source agents there
+    which = {"learner": "tlwd", "point": 1, "seed": 1}
+    here, back = (load_agent(agents_path(tmp_path / where / "fig9", range(2)), **which) for where in ("local", "dask"))
+    np.testing.assert_array_equal(here.policy(), back.policy())
+    assert back.provenance["command"] == command()  # of this process, not of the worker
+    for name in ("fig9", "source"):
+        local, dask = (store.load(tmp_path / where / name, 2) for where in ("local", "dask"))
+        xr.testing.assert_equal(local, dask)
+
+
+@pytest.mark.parametrize(
+    ("cores", "of", "shares"),
+    [
+        ([0, 1, 2, 3, 4], 2, [[0, 2, 4], [1, 3]]),
+        ([2, 5], 2, [[2], [5]]),
+        ([2, 5], 3, [[2], [5], [2]]),
+    ],
+)
+def test_workers_of_one_machine_share_its_cores(cores, of, shares):
+    assert [share(cores, number, of) for number in range(of)] == shares
+
+
+@pytest.mark.parametrize(
+    ("flags", "message"),
+    [
+        (["--workers", "0"], "workers: 0; allowed: an int from 1 to 1024"),
+        (["--workers", "2", "--scheduler", "tcp://h:1"], "workers: 2; allowed: none together with scheduler"),
+        (["--scheduler", "nonsense://"], "scheduler: 'nonsense://'; allowed: the address of a running scheduler"),
+    ],
+)
+def test_bad_clusters_are_refused(flags, message, capsys, tmp_path):
+    pytest.importorskip("distributed", reason="the extra dask is not installed")
+    assert main([*ARGUMENTS, *flags, "--out", str(tmp_path)]) == 2
+    assert message in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,149 @@
+"""Files in place of the paper's parameters: what they change in both environments, in figures and in sweeps."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+import jrcjax
+from jrcjax.config.toml import save_params
+from jrcjax.types import COUNTING_RULES, DISTANCES
+from paper_figs.__main__ import main as figures_main
+from sweeps.__main__ import main as sweeps_main
+from sweeps.engine.program import points_of
+from sweeps.preset import check_preset, environment_of, preset_of
+from sweeps.results.store import digest_of
+from sweeps.studies.multiverse import UNIVERSES, read_as
+from sweeps.studies.registry import SWEEPS
+
+TRAFFIC = """\
+# Objects as somebody counted them.
+environment = "target"
+
+[radar]
+density = 30.5
+class_share = [0.6, 0.4]
+size_mean = [[4.5, 2.0], [0.75, 0.5]]
+size_std = [[0.25, 0.125], [0.0625, 0.03125]]
+bank_size = 64
+"""
+
+
+@pytest.fixture
+def traffic(tmp_path):
+    file = tmp_path / "traffic.toml"
+    file.write_text(TRAFFIC)
+    return file
+
+
+def test_a_file_changes_both_environments_and_its_density_is_the_targets(traffic):
+    preset = preset_of(str(traffic))
+    by_itself = jrcjax.load_params(traffic)
+    room = environment_of("target", preset).radar.max_objects  # for the source's objects, too
+    assert all(np.asarray(room) >= by_itself.radar.max_objects)
+    alone = by_itself.replace(radar=dataclasses.replace(by_itself.radar, max_objects=room))
+    assert digest_of(environment_of("target", preset)) == digest_of(alone)
+    target, source = (environment_of(name, preset) for name in ("target", "source"))
+    assert (float(target.radar.density), float(source.radar.density)) == (30.5, 61.0)
+    for name, params in {"target": target, "source": source}.items():
+        np.testing.assert_array_equal(params.radar.size_mean, [[4.5, 2.0], [0.75, 0.5]])
+        np.testing.assert_array_equal(params.speed.prior, jrcjax.paper_params(name).speed.prior)
+
+
+def test_a_figures_own_parameter_replaces_the_files(traffic):
+    preset = preset_of(str(traffic))
+    radars = points_of(SWEEPS["fig8"], preset).params.radar
+    np.testing.assert_array_equal(radars.density, SWEEPS["fig8"].x_values)
+    assert set(np.asarray(radars.size_mean[:, 0, 0])) == {4.5}
+    assert set(np.asarray(points_of(SWEEPS["fig7"], preset).params.radar.density)) == {30.5}
+
+
+def test_comments_order_and_the_name_of_the_target_do_not_matter(traffic, tmp_path):
+    lines = TRAFFIC.splitlines()
+    other = tmp_path / "other.toml"
+    other.write_text("\n".join(["[radar]", *reversed(lines[4:])]))
+    assert preset_of(str(other)) == preset_of(str(traffic))
+
+
+def test_a_files_own_preset_is_the_table_that_it_changes(tmp_path):
+    file = tmp_path / "table.toml"
+    file.write_text('preset = "paper_table"')
+    for name in ("source", "target"):
+        of_file, of_paper = environment_of(name, preset_of(str(file))), jrcjax.paper_params(name, "paper_table")
+        assert digest_of(of_file) == digest_of(of_paper)
+
+
+def test_a_whole_environment_may_be_a_preset(tmp_path, target):
+    file = tmp_path / "whole.toml"
+    save_params(file, target)
+    assert digest_of(environment_of("target", preset_of(str(file)))) == digest_of(target)
+
+
+def test_universes_take_the_sizes_from_the_file(traffic):
+    params = environment_of("target", preset_of(str(traffic)))
+    of_resolution = {universe.resolution: universe for universe in UNIVERSES}
+    assert len(of_resolution) == 3
+    for (distance, rule), universe in of_resolution.items():
+        radar = read_as(params, universe).radar
+        assert float(radar.density) == 30.5
+        np.testing.assert_array_equal(radar.size_mean, [[4.5, 2.0], [0.75, 0.5]])
+        assert (DISTANCES[int(radar.distance)], COUNTING_RULES[int(radar.counting_rule)]) == (distance, rule)
+
+
+@pytest.mark.slow
+def test_figures_and_sweeps_take_a_file(traffic, tmp_path, capsys):
+    size = ["--seeds", "1", "--episodes", "2"]
+    assert figures_main(["--only", "8", *size, "--preset", str(traffic), "--out", str(tmp_path / "figures")]) == 0
+    (results,) = (tmp_path / "figures" / "results").iterdir()
+    assert results.name.startswith("file-")
+    page = (tmp_path / "figures" / "report.html").read_text()
+    assert "--preset FILE.toml" in page
+    assert "size_mean = [[4.5, 2.0], [0.75, 0.5]]" in page
+    configuration = json.loads((results / "fig8" / "manifest.json").read_text())["configuration"]
+    assert "density = 30.5" in configuration["preset"]
+    # The results are those of the other command, for which the file need not be there any more.
+    traffic.unlink()
+    assert sweeps_main(["verify", str(results / "fig8")]) == 0
+    capsys.readouterr()
+
+
+@pytest.mark.parametrize("main", [["paper_figs"], ["sweeps", "run", "fig6"], ["sweeps", "run", "multiverse"]])
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[radar]\ndensitty = 3.0", "radar.densitty: 'an unknown key'"),
+        ("[radar]\ndensity = 0", "radar.density: 0; allowed: a number of objects > 0"),
+        ("[radar]\ndensity = [1.0, 2.0]", "radar.density: "),
+        ("[radar]\nsize_mean = [[4.5, 2.0]]", "radar.size_mean: "),
+        ("[radar", "preset: "),
+        ('environment = "source"', "environment: 'source'; allowed: 'target'"),
+        (
+            "[road]\nprior = [0.2, 0.3, 0.5]\nevent_probability = [0.1, 0.2, 0.3]",
+            "levels (2, 3, 2, 2, 2) and 4 actions'; allowed: the paper's",
+        ),
+    ],
+)
+def test_a_file_that_cannot_be_is_refused_before_anything_is_written(main, text, message, tmp_path, capsys):
+    file, out = tmp_path / "bad.toml", tmp_path / "out"
+    file.write_text(text)
+    module, *arguments = main
+    command = figures_main if module == "paper_figs" else sweeps_main
+    assert command([*arguments, "--preset", str(file), "--out", str(out)]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert str(file) in error
+    assert not out.exists()
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path, capsys):
+    file, out = tmp_path / "none.toml", tmp_path / "out"
+    assert figures_main(["--preset", str(file), "--out", str(out)]) == 2
+    assert str(file) in capsys.readouterr().err
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("preset", ["town", "", None, 3, ["paper"], "[radar]\ndensity = -1\n"])
+def test_no_preset(preset):
+    with pytest.raises(ValueError, match=r"preset: |radar\.density: "):
+        check_preset(preset)

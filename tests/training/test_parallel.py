@@ -1,0 +1,135 @@
+"""Agents in blocks on all devices give what a plain vmap gives."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jrcjax
+from jrcjax.learners.hparams import Config, HParams
+from jrcjax.training import parallel
+from jrcjax.training.rollout import init_agent, learner_for, run_episodes
+
+UNIT = parallel.BLOCK * jax.device_count()
+CONFIG = Config(episodes=3, batch_size=8, replay_capacity=64, hidden=(8,), optimiser="sgd")
+
+
+def environment():
+    return jrcjax.paper_params("target").replace(max_steps_in_episode=20)
+
+
+def train(shared, key):
+    return jrcjax.train(key, *shared, learner="ddqn", config=CONFIG)[1]
+
+
+@pytest.mark.parametrize("count", [1, 2, parallel.BLOCK, UNIT - 1, UNIT, UNIT + 1, 10 * UNIT, 1000])
+def test_padded_is_the_next_multiple(count):
+    padded = parallel.padded(count)
+    assert padded % UNIT == 0
+    assert count <= padded < count + UNIT
+
+
+def test_pad_agents_repeats_the_last():
+    tree = {"a": jnp.arange(3), "keys": jax.random.split(jax.random.key(0), 3), "b": jnp.arange(6.0).reshape(3, 2)}
+    padded = parallel.pad_agents(tree, 5)
+    assert padded["a"].tolist() == [0, 1, 2, 2, 2]
+    assert padded["b"].tolist() == [[0, 1], [2, 3], [4, 5], [4, 5], [4, 5]]
+    assert (padded["keys"][2:] == tree["keys"][2]).all()
+    same = parallel.pad_agents(tree["a"], 3)
+    assert same.tolist() == [0, 1, 2]
+
+
+@pytest.mark.parametrize("blocks", [1, 2, 3])
+def test_over_agents_is_a_vmap(blocks):
+    def function(shared, agent):
+        x, y = agent
+        return {"sum": shared * x + y.sum(), "vector": y * 2.0}
+
+    count = blocks * UNIT
+    agents = (jnp.arange(count, dtype=jnp.float32), jnp.arange(count * 3, dtype=jnp.float32).reshape(count, 3))
+    got = parallel.over_agents(function)(jnp.float32(3.0), agents)
+    wanted = jax.vmap(function, in_axes=(None, 0))(jnp.float32(3.0), agents)
+    jax.tree.map(np.testing.assert_array_equal, got, wanted)
+
+
+@pytest.mark.parametrize("blocks", [1, 2])
+def test_all_devices_take_an_equal_share(blocks):
+    got = parallel.over_agents(lambda shared, agent: agent + shared)(1, jnp.arange(blocks * UNIT))
+    shares = {shard.device: shard.data.shape for shard in got.addressable_shards}
+    assert shares == dict.fromkeys(jax.devices(), (blocks * parallel.BLOCK,))
+
+
+def test_agents_are_refused_unless_they_fill_blocks():
+    with pytest.raises((ValueError, TypeError)):
+        parallel.over_agents(lambda shared, agent: agent)(0, jnp.arange(UNIT + 1))
+
+
+@pytest.fixture(scope="module")
+def keys():
+    return jax.random.split(jax.random.key(7), 3 * UNIT)
+
+
+@pytest.fixture(scope="module")
+def logs(keys):
+    """Logs of training the first 1, 2 and 3 units of agents."""
+    run = parallel.over_agents(train)
+    return [run((environment(), HParams()), keys[: n * UNIT]) for n in (1, 2, 3)]
+
+
+def test_training_in_blocks_is_training_one_by_one(keys, logs):
+    """To rounding: XLA multiplies matrices of a batch in another order than those of one agent."""
+    single = jax.jit(train)
+    for agent in (0, 1, parallel.BLOCK, 2 * UNIT, 3 * UNIT - 1):
+        alone = single((environment(), HParams()), keys[agent])
+        jax.tree.map(lambda a, b, i=agent: np.testing.assert_allclose(a, b[i], rtol=1e-5), alone, logs[2])
+
+
+def test_numbers_do_not_depend_on_how_many_agents_train(logs):
+    """Blocks of fixed size on one code path: several blocks give the same bits whatever their number."""
+    one, two, three = logs
+    jax.tree.map(lambda a, b: np.testing.assert_array_equal(a, b[: len(a)]), two, three)
+    # A single block is compiled without a loop around it, so its last bits may differ.
+    jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b[: len(a)], rtol=1e-5), one, three)
+
+
+def test_agents_with_different_keys_differ(logs):
+    assert len(np.unique(np.asarray(logs[2].reward), axis=0)) == 3 * UNIT
+
+
+def test_in_place_gives_the_same_agents_and_results():
+    def one(step, agent):
+        return {name: leaf + step for name, leaf in agent.items()}, agent["a"].sum()
+
+    agents = {"a": jnp.arange(6.0 * UNIT).reshape(3 * UNIT, 2), "b": jnp.arange(3 * UNIT)}
+    wanted = parallel.over_agents(one)(jnp.int32(5), agents)
+    got = parallel.over_agents(one, in_place=True)(jnp.int32(5), jax.tree.map(jnp.copy, agents))
+    jax.tree.map(np.testing.assert_array_equal, got, wanted)
+    np.testing.assert_array_equal(got[0]["b"], np.arange(3 * UNIT) + 5)
+
+
+@pytest.mark.parametrize("blocks", [1, 3])
+@pytest.mark.parametrize("name", ["ddqn", "tlwd"])
+def test_a_slot_computes_the_network_once(name, blocks):
+    """For the action, the target and the loss; XLA must see that they are the same, in whatever loop it is."""
+    params = environment()
+    config = Config(episodes=2, batch_size=8, replay_capacity=64, demonstrations=32, pretraining=0)
+    learner = learner_for(name, params, config)
+    source = jax.eval_shape(
+        lambda key: jrcjax.train_source(key, params, HParams(), config)[0], jax.random.key(0)
+    )  # shapes are all that compiling needs
+    agents = jax.eval_shape(
+        jax.vmap(lambda key, source: init_agent(key, HParams(), learner, source), in_axes=(0, None)),
+        jax.random.split(jax.random.key(0), blocks * UNIT),
+        source,
+    )
+
+    def run(first, agent):
+        return run_episodes(agent, first, 2, params, HParams(), learner)
+
+    text = parallel.over_agents(run, in_place=True).lower(jnp.int32(0), agents).compile().as_text()
+    forward = [
+        line.count("while/body")
+        for line in text.splitlines()
+        if " dot(" in line and 'ColumnDense_1/dot_general"' in line and "transpose(" not in line
+    ]
+    assert forward.count(max(forward)) == 1
