@@ -13,6 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy import stats
 
+from paper_figs.analysis.intervals import Interval
+
 RESAMPLES = 10_000
 """Bootstrap resamples behind an interval."""
 CONFIDENCE = 0.95
@@ -26,14 +28,6 @@ class Mean(NamedTuple):
     low: np.ndarray
     high: np.ndarray
     n_seeds: int
-
-
-class Interval(NamedTuple):
-    """A number with its 95 % confidence interval, which is NaN where one seed says nothing about others."""
-
-    value: float
-    low: float
-    high: float
 
 
 Statistic = Callable[..., np.ndarray]
