@@ -1,87 +1,189 @@
-"""How a claim of the paper is judged: an effect with a 95 % interval over seeds, and a verdict.
+"""How a claim is judged: an effect with its 95 % interval over seeds, a verdict, and whether a difference matters.
 
-A claim is a statement "effect <= limit" or "effect >= limit". With the whole interval on the claim's side of the limit
-it is supported, with the whole interval on the other side contradicted, and otherwise undecided at this number of
-seeds. The interval is a symmetric bootstrap over seeds with a fixed generator
-(`paper_figs.analysis.statistics.bootstrap`).
+A claim says that an effect is above a limit, below it, or between two. With its whole interval strictly on the claim's
+side it is supported, strictly on the other side contradicted, and else undecided at this number of seeds. A tie is on
+neither side. Each limit of an interval has an error of 2.5 %, and so have both verdicts at the edge of the claim.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+import dataclasses
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-import xarray as xr
 
-from paper_figs.analysis.statistics import Statistic, bootstrap
+from paper_figs.analysis import divergence
+from paper_figs.analysis.intervals import Interval
+from paper_figs.claims.effects import Effect, Measured
+from paper_figs.claims.results import Results, Unknown
+
+SUPPORTED, CONTRADICTED, UNDECIDED = VERDICTS = ("supported", "contradicted", "undecided")
+Limit = float | tuple[float, float]
+"""What an effect is held against: a number for ">" and "<", two for "within"."""
 
 
 @dataclass(frozen=True)
-class Judgement:
-    """The verdict on one statement of the paper."""
+class Claim:
+    """One statement of the paper, and the question that it asks of results."""
 
     claim: str
     """Number in the list of claims, with the part that is judged."""
     statement: str
+    figure: str
+    """Number of the figure, with its panel: "5a"."""
+    where: str
+    """Section of the paper."""
     effect: str
-    """What is measured."""
+    """What is measured, in words."""
+    measure: Effect
     relation: str
-    """<= or >=: how the claim holds the effect against the limit."""
-    limit: float
+    """">", "<" or "within"."""
+    limit: Limit
+    unit: str
+
+    @property
+    def sweep(self) -> str:
+        """Name of the figure's results: panels of Fig. 5 have their own."""
+        number, panel = self.figure[0], self.figure[1:]
+        return f"fig{number}{panel}" if number == "5" else f"fig{number}"
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """The verdict on one claim."""
+
+    claim: str
+    statement: str
+    figure: str
+    where: str
+    effect: str
+    unit: str
+    relation: str
+    limit: Limit
     value: float
+    """NaN where the results can't say; infinite for the episode of runs that never converge."""
     ci_low: float
     ci_high: float
+    """Limits of the interval, each wrong with a chance of 2.5 %; NaN where there are too few seeds."""
     verdict: str
     """supported, contradicted, or undecided."""
+    reason: str
+    """Why it is undecided; else empty."""
+    negligible: bool | None
+    """Whether the learners differ by less than `delta`, interval included; None where nothing is compared or known."""
+    delta: float | None
+    """Differences up to this are negligible: a share of the reward's optimum or of the other's throughput, a
+    probability of miss detection, or episodes."""
+    held: str
+    """At how many points the claim is supported, where it is about all of them."""
     n_seeds: int
-    figure: str
-    """The figure that the verdict rests on."""
     n_diverged: int = 0
-    """Agents in that figure's results whose values diverged; they count like all others."""
+    """Agents in the figure's results whose values diverged; they count like all others."""
 
 
-def verdict_of(low: float, high: float, relation: str, limit: float) -> str:
-    """Verdict on "effect <= limit" or "effect >= limit" from the effect's interval."""
-    if relation == ">=":
-        low, high, limit = -high, -low, -limit
-    if high <= limit:
-        return "supported"
-    if low > limit:
-        return "contradicted"
-    return "undecided"
+def verdicts(low: Any, high: Any, relation: str, limit: Limit) -> np.ndarray:
+    """Verdicts from the limits of intervals, which may be arrays."""
+    low, high = np.asarray(low, float), np.asarray(high, float)
+    if relation == "within":
+        least, most = _two(limit)
+        supported, contradicted = (low > least) & (high < most), (high < least) | (low > most)
+    elif relation == ">":
+        supported, contradicted = low > limit, high < limit
+    elif relation == "<":
+        supported, contradicted = high < limit, low > limit
+    else:
+        raise ValueError(f"relation: {relation!r}; allowed: '>', '<' or 'within'")
+    return np.select([supported, contradicted], [SUPPORTED, CONTRADICTED], UNDECIDED)
 
 
-def judge(
-    claim: str,
-    statement: str,
-    effect: str,
-    values: np.ndarray,
-    relation: str,
-    limit: float,
-    figure: str,
-    statistic: Statistic = lambda means: means,
-    extreme: Callable[[np.ndarray], np.floating] | None = None,
-    least: float = -np.inf,
-) -> Judgement:
-    """Judges "effect <= limit", or >=, where the effect is a statistic of means over seeds of `values` [seeds, ...].
+def is_on_its_side(value: float, relation: str, limit: Limit) -> bool:
+    """Whether an estimate, whatever its interval, is on the claim's side."""
+    return str(verdicts(value, value, relation, limit)) == SUPPORTED
 
-    `extreme`, np.min or np.max, says which of several effects the claim is about. No effect is below `least`, and
-    neither are intervals.
+
+def _two(limit: Limit) -> tuple[float, float]:
+    if not isinstance(limit, Sequence) or len(limit) != 2:
+        raise ValueError(f"limit: {limit!r}; allowed: two numbers for 'within'")
+    return limit[0], limit[1]
+
+
+def negligible(differences: Sequence[Interval], delta: float) -> bool | None:
+    """Whether all differences lie between -delta and delta with their whole intervals; None where there are none.
+
+    Each limit needs no correction, since all must hold (two one-sided tests, Schuirmann 1987; intersection-union).
     """
-    value, low, high = bootstrap(values, statistic, extreme)
-    low = float(np.maximum(low, least))  # of NaN and a number, NaN
-    verdict = verdict_of(low, high, relation, limit)
-    return Judgement(claim, statement, effect, relation, limit, value, low, high, verdict, len(values), figure)
+    if not differences or any(np.isnan([d.low, d.high]).any() for d in differences):
+        return None
+    return all(-delta < d.low and d.high < delta for d in differences)
 
 
-def first(data: xr.Dataset, metric: str, algorithm: str, episodes: int | None = None) -> np.ndarray:
-    """Mean of a simulated metric over the first `episodes` (all if None) at each point, [seeds, points]."""
-    values = data[metric].sel(algorithm=algorithm).isel(episode=slice(episodes))
-    return values.mean("episode").transpose("seed", "point").values
+def judge(claim: Claim, results: Results) -> Judgement:
+    """The verdict on a claim from the results of its figure."""
+    try:
+        measured = claim.measure(results)
+    except Unknown as unknown:
+        return _unknown(claim, str(unknown), results.n_seeds)
+    value, low, high = (float(number) for number in measured.interval)
+    delta = getattr(results.rules.delta, measured.quantity) if measured.quantity else None
+    least = results.rules.least_seeds
+    if results.n_seeds < least:
+        no_number = f"{results.n_seeds} seeds, {least} needed for a verdict"
+        estimated = dataclasses.replace(_unknown(claim, no_number, results.n_seeds), value=value, delta=delta)
+    else:
+        estimated = _decided(claim, measured, Interval(value, low, high), delta, results.n_seeds)
+    agents = [str(name) for name in results.data["algorithm"].values]
+    return dataclasses.replace(estimated, n_diverged=sum(divergence.count(results.data, name) for name in agents))
+
+
+def _decided(claim: Claim, measured: Measured, interval: Interval, delta: float | None, n_seeds: int) -> Judgement:
+    verdict = str(verdicts(interval.low, interval.high, claim.relation, claim.limit))
+    return Judgement(
+        **_of(claim),
+        value=interval.value,
+        ci_low=interval.low,
+        ci_high=interval.high,
+        verdict=verdict,
+        reason=f"the interval of {n_seeds} seeds holds the limit" if verdict == UNDECIDED else "",
+        negligible=None if delta is None else negligible(measured.differences, delta),
+        delta=delta,
+        held=measured.held,
+        n_seeds=n_seeds,
+    )
+
+
+def _unknown(claim: Claim, reason: str, n_seeds: int) -> Judgement:
+    nan = math.nan
+    return Judgement(**_of(claim), value=nan, ci_low=nan, ci_high=nan, verdict=UNDECIDED, reason=reason,
+                     negligible=None, delta=None, held="", n_seeds=n_seeds)  # fmt: skip
+
+
+def missing(claim: Claim) -> Judgement:
+    """What is said of a claim whose figure has no results."""
+    return _unknown(claim, f"no results of {claim.sweep}", 0)
+
+
+def _of(claim: Claim) -> dict[str, Any]:
+    names = ("claim", "statement", "figure", "where", "effect", "unit", "relation", "limit")
+    return {name: getattr(claim, name) for name in names}
 
 
 def as_json(judgements: list[Judgement]) -> list[dict]:
-    """Plain dictionaries; an interval that does not exist is null."""
-    plain = [asdict(judgement) for judgement in judgements]
-    return [{key: None if value != value else value for key, value in row.items()} for row in plain]
+    """Plain dictionaries; a number that is not finite is null: no interval, no bound, or runs that never converge."""
+    plain = [dataclasses.asdict(judgement) for judgement in judgements]
+    return [{key: _number(value) for key, value in row.items()} for row in plain]
+
+
+def _number(value: Any) -> Any:
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def from_json(rows: list[dict]) -> list[Judgement]:
+    """The judgements that `as_json` wrote; what was not finite is NaN."""
+    numbers = ("value", "ci_low", "ci_high")
+    return [
+        Judgement(**{key: math.nan if value is None and key in numbers else value for key, value in row.items()})
+        for row in rows
+    ]
