@@ -17,10 +17,6 @@ from scipy import special, stats
 
 ERROR = 0.025
 """Chance of one limit to be on the wrong side of the truth; both together leave 95 %."""
-HIDDEN_SKEWNESS = 40.0
-"""How much of the skewness a small sample hides: n values show about n / (n + 40) of it when their mean is far off.
-
-With this number a limit of the mean of ten exponential values has an error of 3 %. For other laws it is checked."""
 _BISECTIONS = 50
 
 
@@ -60,8 +56,9 @@ def _distances(second: Any, third: Any, n: int, t: Any) -> tuple[Any, Any]:
     order its limits move to the right by (1 + 2 t^2) / (6 sqrt(n)) skewnesses and standard errors (Johnson 1978,
     Journal of the American Statistical Association 73; Hall 1992, Journal of the Royal Statistical Society B 54). Small
     samples show less skewness than there is (Bobée and Robitaille 1975, Water Resources Research 11), and symmetric
-    laws with heavy tails show some where there is none. So a limit moves outwards by more than the formula says, the
-    more the fewer the seeds, and inwards by half.
+    laws with heavy tails show some where there is none. So a limit moves outwards by more than the formula says and
+    inwards by less. How much is set so that both errors are near 2.5 % from 5 to 1000 seeds for normal, exponential and
+    heavy-tailed values; `paper_figs.calibration` looks at other laws, too.
 
     Args:
       second: central moment of the values.
@@ -71,14 +68,11 @@ def _distances(second: Any, third: Any, n: int, t: Any) -> tuple[Any, Any]:
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         skewness = np.where(second > 0, third / second**1.5, 0.0)
-    move = (1 / t + 2 * t) / (6 * np.sqrt(n)) * skewness
+    lean = skewness / np.sqrt(n)
+    outwards, inwards = (1 + 40 / n) * (1 / t + 2 * t) / 6, 0.28 + 2.4 / n
+    longer, shorter = 1 + outwards * np.abs(lean), 1 / (1 + inwards * np.abs(lean))
     half = t * np.sqrt(second / max(n - 1, 1))
-    return half * _stretch(-move, n), half * _stretch(move, n)
-
-
-def _stretch(move: np.ndarray, n: int) -> np.ndarray:
-    """Factor of a limit's distance that moves outwards by the part `move`, or inwards where that is negative."""
-    return np.where(move > 0, 1 + (1 + HIDDEN_SKEWNESS / n) * move, 1 / (1 - np.minimum(move, 0.0) / 2))
+    return half * np.where(lean < 0, longer, shorter), half * np.where(lean > 0, longer, shorter)
 
 
 def ratio_effect(a: np.ndarray, b: np.ndarray, error: float | np.ndarray = ERROR) -> Interval:
@@ -184,8 +178,8 @@ def interquartile_mean(values: np.ndarray, error: float = ERROR) -> Interval:
     kept = n - 2 * left_out
     value = values[left_out : n - left_out].mean(axis=0)
     apart = np.clip(values, values[left_out], values[n - 1 - left_out])
-    apart = (apart - apart.mean(axis=0)) * n / kept
-    below, above = _distances((apart**2).mean(axis=0), (apart**3).mean(axis=0), n, _student(error, kept))
+    apart = (apart - apart.mean(axis=0)) * n / kept * np.sqrt((kept - 1) / max(n - 1, 1))
+    below, above = _distances((apart**2).mean(axis=0), (apart**3).mean(axis=0), kept, _student(error, kept))
     return Interval(value, value - below, value + above)
 
 

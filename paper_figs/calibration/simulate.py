@@ -1,19 +1,27 @@
-"""Simulated studies of a world, and how often the interval and the verdict of each are wrong."""
+"""Simulated studies of a world, how often the interval and the verdict of each are wrong, and the table of all."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from paper_figs.analysis.intervals import Interval
-from paper_figs.calibration.worlds import World
+from paper_figs.calibration.reach import SEEDS, beyond, reach
+from paper_figs.calibration.worlds import WORLDS, World
 from paper_figs.claims.judge import CONTRADICTED, SUPPORTED, UNDECIDED, verdicts
 from paper_figs.claims.results import Rules
 
-SEEDS = (3, 5, 10, 30, 100, 1000)
-"""Seeds of a study."""
 _NUMBERS_AT_ONCE = 2_000_000
+_NUMBERS_IN_ALL = 120_000_000  # of one world with so many seeds
+_STUDIES = (20_000, 10_000)  # at most, of worlds with one number per seed and with several
+
+
+def studies_of(world: World, n_seeds: int) -> int:
+    """How many studies the published table has of a world."""
+    return min(_STUDIES[world.columns > 1], _NUMBERS_IN_ALL // (n_seeds * world.columns))
 
 
 class Rates(NamedTuple):
@@ -46,3 +54,28 @@ def _count(world: World, interval: Interval, n_seeds: int) -> np.ndarray:
         found = np.full_like(found, UNDECIDED)
     holds = (interval.low <= world.truth) & (world.truth <= interval.high)
     return np.array([holds.sum(), (found == SUPPORTED).sum(), (found == CONTRADICTED).sum()])
+
+
+def rows(worlds: Iterable[World] = WORLDS, seeds: Iterable[int] = SEEDS, most: int | None = None) -> Iterator[dict]:
+    """The table's rows, as they come; `most` studies each."""
+    for world in worlds:
+        for n in seeds:
+            studies = min(studies_of(world, n), most or _STUDIES[0])
+            rates, missing = simulate(world, n, studies), beyond(world.rule, world.name, n)
+            yield {
+                "rule": world.rule,
+                "world": world.name,
+                "n_seeds": n,
+                "studies": studies,
+                **rates._asdict(),
+                "simulation_error": float(np.sqrt(0.025 * 0.975 / studies)),
+                "out_of_reach": int(missing is not None),
+                "what": missing.what if missing else "",
+                "reason": missing.why if missing else "",
+                "in_reach_from": reach(world.rule, world.name),
+            }
+
+
+def table(found: Iterable[dict]) -> pd.DataFrame:
+    """Rows as a table. `simulation_error` is the standard error of a rate of 2.5 %; `in_reach_from` are seeds."""
+    return pd.DataFrame(found).astype({"in_reach_from": "Int64"})

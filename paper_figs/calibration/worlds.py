@@ -146,7 +146,7 @@ def _runs(law: Law, common: float) -> Draw:
     return draw
 
 
-_MIDDLE = 2 * stats.expon.expect(lb=stats.expon.ppf(0.25), ub=stats.expon.ppf(0.75)) - 1.0
+_MIDDLE = float(2 * stats.expon.expect(lb=stats.expon.ppf(0.25), ub=stats.expon.ppf(0.75))) - 1.0
 _MEDIAN_OF_ALL = float(np.exp(stats.norm.ppf(0.5 / (1 - _NEVER))))
 
 
@@ -164,27 +164,24 @@ def _means() -> list[World]:
 
 
 def _points() -> list[World]:
-    every, up, rise = pointwise.every_point, pointwise.up_to, pointwise.trend
-    columns = 3 * POINTS
     found = []
-    for law in ("normal", "exponential", "t with 3 degrees of freedom"):
-        draw = laws.LAWS[law]
-        found += [
-            World("every point", f"{law}, one worst", every, _leads(draw, _CLEAR), 0.0, columns=columns),
-            World("every point", f"{law}, all equal", every, _leads(draw, 0.0), 0.0, columns=columns),
-            World("up to", f"{law}, one best", up, _reductions(draw, 0.6), 0.67, columns=columns),
-            World("up to", f"{law}, all equal", up, _reductions(draw, 0.0), 0.67, columns=columns),
-            World("rises", f"{law}, one flat step", rise, _steps(draw, _CLEAR), 0.0, columns=columns),
-            World("rises", f"{law}, all flat", rise, _steps(draw, 0.0), 0.0, columns=columns),
-        ]
+    for rule, interval, draw, names, clear, truth in (
+        ("every point", pointwise.every_point, _leads, ("one worst", "all equal"), _CLEAR, 0.0),
+        ("up to", pointwise.up_to, _reductions, ("one best", "all equal"), 0.6, 0.67),
+        ("rises", pointwise.trend, _steps, ("one flat step", "all flat"), _CLEAR, 0.0),
+    ):
+        for law in ("normal", "exponential", "t with 3 degrees of freedom"):
+            for name, apart in zip(names, (clear, 0.0), strict=True):
+                studies = draw(laws.LAWS[law], apart)
+                found.append(World(rule, f"{law}, {name}", interval, studies, truth, columns=3 * POINTS))
     return found
 
 
 def _convergence() -> list[World]:
     earlier, typical = censored.earlier, censored.typical
     return [
-        World("earlier", "no ties", earlier, _two(0.0), 0.5),
-        World("earlier", "ties", earlier, _two(0.0, 0.5), 0.5),
+        World("earlier", "without ties", earlier, _two(0.0), 0.5),
+        World("earlier", "with ties", earlier, _two(0.0, 0.5), 0.5),
         World("earlier", "one run in ten never converges", earlier, _two(_NEVER), 0.5),
         World("earlier", "learners that share seeds", earlier, _shared, 0.5),
         World("typical episode", "at the upper end of the band", typical, _one(0.0), 1.0, "within", (1 / 3, 1.0)),
@@ -207,7 +204,9 @@ def _descriptions() -> list[World]:
     middle, improvement = intervals.interquartile_mean, intervals.probability_of_improvement
     return [
         World("inter-quartile mean", "normal", middle, lambda rng, n, b: (laws.normal(rng, (n, b)),), 0.0),
-        World("inter-quartile mean", "exponential", middle, lambda rng, n, b: (laws.exponential(rng, (n, b)),), _MIDDLE),
+        World(
+            "inter-quartile mean", "exponential", middle, lambda rng, n, b: (laws.exponential(rng, (n, b)),), _MIDDLE
+        ),
         World("improvement", "normal", improvement, _runs(laws.normal, 0.0), 0.5),
         World("improvement", "lognormal", improvement, _runs(laws.lognormal, 0.0), 0.5),
         World("improvement", "learners that share seeds", improvement, _runs(laws.normal, 1.0), 0.5),
