@@ -80,7 +80,7 @@ lock:  ## renew requirements.lock (needs uv; UPGRADE=--upgrade for newer version
 	@command -v uv >/dev/null || { echo "error: make lock needs uv" >&2; exit 1; }
 	uv pip compile --universal --python-version 3.11 --fork-strategy fewest --prerelease if-necessary-or-explicit \
 	  --generate-hashes --no-header --no-annotate --no-emit-index-url --no-emit-find-links --quiet $(UPGRADE) \
-	  --extra dev pyproject.toml -o requirements.lock
+	  --extra studies --extra dev pyproject.toml -o requirements.lock
 
 clean:  ## remove the environment and everything else that was built
 	rm -rf $(VENV) build dist .pytest_cache .ruff_cache .hypothesis

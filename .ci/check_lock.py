@@ -10,8 +10,9 @@ from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).resolve().parent.parent
 PYTHONS = ("3.11", "3.12", "3.13")
-# Clients and peers, whose PyTorch differs between platforms and sources, and the reader of one data set.
-NOT_LOCKED = {"peers", "clients", "gymnasium", "nuscenes"}
+# Clients and peers, whose PyTorch differs between platforms and sources, the reader of one data set, and what the
+# documentation and the explorer need, which come on top.
+NOT_LOCKED = {"peers", "clients", "gymnasium", "nuscenes", "docs", "explorer"}
 HASH = re.compile(r"--hash=sha256:[0-9a-f]{64}(?=\s|$)")
 
 

@@ -15,7 +15,7 @@ import jrcjax
 from jrcjax import rng
 from jrcjax.exact import greedy_policy
 from jrcjax.learners import Learner
-from jrcjax.model import states
+from jrcjax.model.states import num_states
 
 TEMPERATURE = 30.0  # in units of reward: smaller differences between actions hardly count
 
@@ -29,7 +29,7 @@ class Table(NamedTuple):
 
 def expected_sarsa(spec, config) -> Learner:
     """Values of the Boltzmann policy that acts."""
-    shape = (states.num_states(spec.shape), spec.num_actions)
+    shape = (num_states(spec.shape), spec.num_actions)
 
     def chances(values):
         return jax.nn.softmax(values / TEMPERATURE)

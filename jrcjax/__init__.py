@@ -4,7 +4,7 @@ Reproduces and examines N. Q. Hieu et al., "Transferable Deep Reinforcement Lear
 with Joint Radar-Data Communications" (arXiv:2105.13670), called the paper throughout.
 """
 
-from jrcjax import events, exact, radar
+from jrcjax import events, exact, front, radar
 from jrcjax.agents.file import load_agent, save_agent, save_agents
 from jrcjax.agents.saved_agent import Evaluation, SavedAgent
 from jrcjax.config.toml import load_params, save_params
@@ -22,6 +22,6 @@ __version__ = "0.1.0"
 
 __all__ = [
     "AgentState", "Config", "EnvParams", "EnvState", "Evaluation", "HParams", "JRCEnv", "Log", "SavedAgent", "Source",
-    "Transfer", "check_params", "events", "exact", "load_agent", "load_params", "paper_params", "radar", "save_agent",
-    "save_agents", "save_params", "train", "train_agents", "train_source", "transfer",
+    "Transfer", "check_params", "events", "exact", "front", "load_agent", "load_params", "paper_params", "radar",
+    "save_agent", "save_agents", "save_params", "train", "train_agents", "train_source", "transfer",
 ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""The paper's figures: which sweep each rests on, how it is drawn, and which claims it bears."""
+"""The paper's figures: which sweep each rests on, and how it is drawn."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ import pandas as pd
 import xarray as xr
 from matplotlib.figure import Figure
 
-from paper_figs.claims import learning_claims, sweep_claims
-from paper_figs.claims.judge import Judgement
+from paper_figs.claims.results import AXES
 from paper_figs.plots import curves, points
 
 
@@ -24,12 +23,10 @@ class PaperFigure:
     number: int
     """Number in the paper, as `--only` takes it."""
     title: str
-    table: Callable[[xr.Dataset], pd.DataFrame]
-    """Results to plotted numbers."""
+    table: Callable[[xr.Dataset, int], pd.DataFrame]
+    """Results and slots per episode to plotted numbers."""
     draw: Callable[[pd.DataFrame, str], Figure]
     """Plotted numbers and title to picture."""
-    claims: Callable[[xr.Dataset], list[Judgement]]
-    """Results to verdicts."""
 
 
 FIGURES = (
@@ -37,49 +34,43 @@ FIGURES = (
         name="fig5a",
         number=5,
         title="Fig. 5(a): source environment",
-        table=lambda data: curves.table(data, figure="5", panel="a"),
+        table=lambda data, slots: curves.table(data, figure="5", panel="a"),
         draw=curves.draw,
-        claims=learning_claims.source_claims,
     ),
     PaperFigure(
         name="fig5b",
         number=5,
         title="Fig. 5(b): target environment",
-        table=lambda data: curves.table(data, figure="5", panel="b"),
+        table=lambda data, slots: curves.table(data, figure="5", panel="b"),
         draw=curves.draw,
-        claims=learning_claims.target_claims,
     ),
     PaperFigure(
         name="fig6",
         number=6,
         title="Fig. 6: event probability at high speed",
-        table=lambda data: points.table(data, "6", "high_speed_event_probability"),
+        table=lambda data, slots: points.table(data, "6", AXES["fig6"].coordinate, slots),
         draw=functools.partial(points.draw, x_label="$p_1^v$"),
-        claims=sweep_claims.speed_claims,
     ),
     PaperFigure(
         name="fig7",
         number=7,
         title="Fig. 7: probability of favourable conditions",
-        table=lambda data: points.table(data, "7", "favourable_probability"),
+        table=lambda data, slots: points.table(data, "7", AXES["fig7"].coordinate, slots),
         draw=functools.partial(points.draw, x_label=r"$\tau_0$ of all factors"),
-        claims=sweep_claims.favourable_claims,
     ),
     PaperFigure(
         name="fig8",
         number=8,
         title="Fig. 8: traffic density",
-        table=lambda data: points.table(data, "8", "density"),
+        table=lambda data, slots: points.table(data, "8", AXES["fig8"].coordinate, slots),
         draw=functools.partial(points.draw, x_label=r"$\omega$ (objects per 45 m $\times$ 45 m)"),
-        claims=sweep_claims.density_claims,
     ),
     PaperFigure(
         name="fig9",
         number=9,
         title="Fig. 9: TLwD in the target",
-        table=lambda data: curves.table(data, figure="9", panel="", points={"tlwd": 0, "tlwd_uniform": 1}),
+        table=lambda data, slots: curves.table(data, figure="9", panel="", points={"tlwd": 0, "tlwd_uniform": 1}),
         draw=curves.draw,
-        claims=learning_claims.replay_claims,
     ),
 )
 NUMBERS = tuple(sorted({figure.number for figure in FIGURES}))

@@ -1,182 +1,253 @@
-"""The tables and numbers that the README quotes, from the folder that `make figures` wrote.
+"""The parts of texts that are made from published results: tables of verdicts, and sentences with numbers.
 
-Run as `python -m paper_figs.readme [OUT]`.
+A text marks them, `<!-- made by python -m paper_figs.publish: NAME -->` to `<!-- end of NAME -->`, where NAME is one of
+`BLOCKS`. What stands between is replaced by `renewed`, so no number in a text can differ from the results it quotes.
 """
 
 from __future__ import annotations
 
-import dataclasses
+import functools
 import json
-import sys
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any
 
-import jax
-import jax.numpy as jnp
+import numpy as np
 import pandas as pd
-import xarray as xr
 
-from jrcjax import exact
-from jrcjax.learners.hparams import Config, HParams
-from jrcjax.model.presets import paper_params
-from jrcjax.training import parallel
-from jrcjax.training.transfer import transfer
-from paper_figs.__main__ import results_folder
-from paper_figs.analysis.convergence import TOLERANCE, convergence_episode, gaps
-from paper_figs.analysis.statistics import CONFIDENCE
-from paper_figs.claims.judge import first
-from paper_figs.claims.learning_claims import source_claims
-from paper_figs.figures import FIGURES
-from sweeps.results import store
-from sweeps.studies.ablation import VARIANTS
-from sweeps.sweep import Size
+from paper_figs.claims import words
+from paper_figs.claims.judge import VERDICTS, Judgement, from_json
+from paper_figs.claims.learning_table import LABELS
+from paper_figs.claims.table import TITLES, number_of
 
-MULTIVERSE = Path(__file__).parent / "multiverse"
-"""Summary of a multiverse that the README rests on."""
+FIGURES, ROBUSTNESS = "figures", "robustness"
+"""Folders of published results: those of `make figures`, and those of the robustness study."""
+_BEGIN = "<!-- made by python -m paper_figs.publish: {name} -->"
+_END = "<!-- end of {name} -->"
+_ANY = re.compile(r"<!-- made by python -m paper_figs\.publish: (\S+) -->\n(.*?)<!-- end of \1 -->", re.DOTALL)
+_WIDTH = 120
 
 
-def claims_table(claims: list[dict], figure: str) -> str:
-    """Verdicts that rest on one figure, "5a" or "6" with all its panels, as a Markdown table."""
-    head = ("claim", "the paper's statement", "holds if", "measured (95 % interval)", "verdict")
-    rows = [head, ("---",) * len(head)]
-    for c in claims:
-        if not c["figure"].startswith(figure):
-            continue
-        criterion = f"{c['effect']} {c['relation']} {c['limit']:g}"
-        measured = f"{c['value']:.3g} ({c['ci_low']:.3g} to {c['ci_high']:.3g})"
-        rows.append((c["claim"], c["statement"], criterion, measured, c["verdict"]))
-    return "\n".join("| " + " | ".join(row) + " |" for row in rows)
+def renewed(text: str, published: Path) -> str:
+    """The text with all of its marked parts made anew.
 
+    Args:
+      text: of a Markdown file.
+      published: folder of published results.
 
-def standing(verdict: str, supported: float) -> str:
-    """Where a claim holds: by its verdict under the default readings, and the share of universes that support it.
-
-    By chance alone a false claim is supported in up to 2.5 % of universes, so a share of up to 5 % is nowhere.
+    Raises:
+      ValueError: for a name that is not one of `BLOCKS`.
     """
-    if verdict == "supported":
-        return "by default"
-    return "only under other readings" if supported > 1 - CONFIDENCE else "nowhere"
+
+    def made(match: re.Match) -> str:
+        name = match[1]
+        if name not in BLOCKS:
+            raise ValueError(f"block: {name!r}; allowed: {', '.join(BLOCKS)}")
+        return f"{_BEGIN.format(name=name)}\n{BLOCKS[name](published)}\n{_END.format(name=name)}"
+
+    return _ANY.sub(made, text)
 
 
-def readings_table(claims: list[dict], shares: pd.DataFrame) -> str:
-    """Where each claim holds, as a Markdown table: the default verdicts, and those in the universes of a multiverse."""
-    head = ("claim", "by default", "supported", "contradicted", "undecided", "estimate holds", "decided by", "holds")
-    rows = [head, ("---",) * len(head)]
-    by_claim = shares.set_index("claim")
-    for c in claims:
-        share = by_claim.loc[c["claim"]]
-        of_each = [f"{share[part]:.0%}" for part in ("supported", "contradicted", "undecided", "holds")]
-        deciding = "" if pd.isna(share["decided_by"]) else "; ".join(share["decided_by"].split("; ")[:2])
-        about = (deciding.replace("_", " "), standing(c["verdict"], share["supported"]))
-        rows.append((c["claim"], c["verdict"], *of_each, *about))
-    return "\n".join("| " + " | ".join(row) + " |" for row in rows)
+def judgements(published: Path) -> list[Judgement]:
+    """The published verdicts."""
+    return from_json(json.loads((published / FIGURES / "claims.json").read_text(encoding="utf-8")))
 
 
-def quoted_of_source(data: xr.Dataset) -> dict[str, str]:
-    """The single numbers in the text about Fig. 5(a)."""
-    params = paper_params("source")
-    best = exact.optimal_policy(params)
-    epsilon = float(HParams().epsilon_end)
-    explored = (1 - epsilon) * best + epsilon / params.num_actions
-    optimum, constant = (float(data[f"{name}_reward"].isel(point=0)) for name in ("optimum", "constant"))
-    ddqn = gaps(data, "ddqn")
-    late = ddqn[:, 400:]
-    numbers = {
-        "optimal reward per slot": optimum,
-        "optimal reward per slot with exploration": float(exact.evaluate_policy(params, explored).reward),
-        "reward per slot of the best constant action": constant,
-        "its gap": 1 - constant / optimum,
-        "states in which the optimum transmits": float(best[:, : params.num_rates].sum()),
-        "mean optimal value of a state at discount 0.99": float(exact.value_iteration(params).max(axis=1).mean()),
-        "mean gap of DDQN, episodes 51 to 100": float(ddqn[:, 50:100].mean()),
-        "mean gap of DDQN after episode 400": float(late.mean()),
-        f"share of DDQN's snapshots after episode 400 with a gap above {TOLERANCE}": float((late > TOLERANCE).mean()),
-    }
-    words = {name: f"{value:.3g}" for name, value in numbers.items()}
-    for tolerance in (0.01, 0.03, 0.05):
-        verdicts = [f"{c.claim} {c.verdict}" for c in source_claims(data, tolerance)[:3]]
-        words[f"verdicts if within {tolerance:.0%} is optimal"] = ", ".join(verdicts)
-    for seed in range(5):
-        radar = params.radar.replace(bank_seed=jnp.int32(seed))  # pyright: ignore[reportAttributeAccessIssue]
-        other = dataclasses.replace(params, radar=radar)
-        reward = exact.evaluate_policy(other, exact.optimal_policy(other)).reward
-        words[f"optimal reward with bank seed {seed}"] = f"{float(reward):.3f}"
-    return words
+def _numbers(published: Path) -> dict[str, dict[str, Any]]:
+    return json.loads((published / FIGURES / "numbers.json").read_text(encoding="utf-8"))
 
 
-def quoted_of_target(data: xr.Dataset) -> dict[str, str]:
-    """The single numbers in the text about Fig. 5(b)."""
-    optimum, constant = (float(data[f"{name}_reward"].isel(point=0)) for name in ("optimum", "constant"))
-    numbers = {"optimal reward per slot": optimum, "gap of the best constant action": 1 - constant / optimum}
-    for name in ("tlwd", "dpr", "ddqn", "q_learning"):
-        gap = gaps(data, name)
-        numbers |= {
-            f"mean gap of {name} after its first episode": float(gap[:, 0].mean()),
-            f"mean gap of {name}, episodes 51 to 100": float(gap[:, 50:100].mean()),
-            f"mean gap of {name} after episode 400": float(gap[:, 400:].mean()),
-            f"packets per episode of {name}": float(first(data, "throughput", name).mean()),
-            f"miss detection of {name}": float(first(data, "miss_detection", name).mean()),
-        }
-    words = {name: f"{value:.3g}" for name, value in numbers.items()}
-    for name in ("tlwd", "dpr", "ddqn"):
-        words[f"convergence episodes of {name}"] = ", ".join(
-            f"{e:.0f}" for e in sorted(convergence_episode(data, name))
+def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+    return "\n".join("| " + " | ".join(row) + " |" for row in (head, ("---",) * len(head), *rows))
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.3g} %"
+
+
+def _listed(items: Iterable[str]) -> str:
+    """Sentences as a list, wrapped."""
+    return "\n".join(_wrapped(item) for item in items)
+
+
+def _wrapped(item: str) -> str:
+    lines, line = [], "-"
+    for word in item.split():
+        if len(line) + len(word) + 1 > _WIDTH:
+            lines.append(line)
+            line = " "
+        line += f" {word}"
+    return "\n".join([*lines, line])
+
+
+# --- verdicts ---------------------------------------------------------------------------------------------------------
+
+
+def claims_table(found: list[Judgement], figure: str) -> str:
+    """Verdicts that rest on one figure, "5a" or "6" with all its panels."""
+    head = ("claim", "the paper's statement", "holds if", "measured (95 % interval)", "verdict")
+    rows = [
+        (j.claim, j.statement, words.criterion(j), words.measured(j), words.verdict(j))
+        for j in found
+        if j.figure.startswith(figure)
+    ]
+    return _table(head, rows)
+
+
+def _in_short(parts: list[Judgement]) -> str:
+    """How many parts of a claim have which verdict: one word where all have the same."""
+    counts = Counter(part.verdict for part in parts)
+    if len(counts) == 1:
+        return next(iter(counts))
+    return ", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS if counts[verdict])
+
+
+def verdicts_table(published: Path) -> str:
+    """One row per claim with the verdicts of its parts."""
+    found = judgements(published)
+    rows = []
+    for number, title in TITLES.items():
+        parts = [j for j in found if number_of(j.claim) == number]
+        rows.append((number, title, _in_short(parts)))
+    return _table(("", "the paper says", f"here ({found[0].n_seeds} seeds)"), rows)
+
+
+def supported_list(published: Path) -> str:
+    """Which claims have which verdict, by name, and which differences are negligible."""
+    found = judgements(published)
+    sentences = [
+        f"**{verdict.capitalize()}** ({len(named)} of {len(found)}): {'; '.join(named) or 'none'}."
+        for verdict in VERDICTS
+        for named in [[j.claim for j in found if j.verdict == verdict]]
+    ]
+    same = [j.claim for j in found if j.negligible]
+    sentences.append(f"**Negligible differences**, interval included: {'; '.join(same) or 'none'}.")
+    return _listed(sentences)
+
+
+# --- sentences --------------------------------------------------------------------------------------------------------
+
+
+def _gaps_of(numbers: dict[str, Any], when: str, names: tuple[str, ...]) -> str:
+    return ", ".join(f"{LABELS[name]} {_percent(numbers[f'{when}_gap_{name}'])}" for name in names)
+
+
+def source_list(published: Path) -> str:
+    """What else is to be said of Fig. 5(a)."""
+    n, names = _numbers(published)["fig5a"], ("ddqn", "q_learning")
+    tolerances = ", ".join(
+        f"at {_percent(t)} C1 (reached) is {n[f'c1_at_{t:g}']} and C2 (Q-learning, source) {n[f'c2_at_{t:g}']}"
+        for t in (0.01, 0.03, 0.05)
+    )
+    constant = (
+        f"The best action that ignores the state earns {n['constant']:g} per slot, {_percent(n['constant_gap'])} below "
+        f"the optimum of {n['optimum']:g}, which transmits in {n['states_that_transmit']:g} of the 32 states."
+    )
+    explored = f"With the last random actions left in, the optimal policy earns {n['explored']:g}."
+    early, late = (_gaps_of(n, when, names) for when in ("early", "late"))
+    of_learners = f"Mean gaps in episodes 51 to 100: {early}; after episode 400: {late}."
+    verdicts = f"The verdicts depend on the gap that counts as optimal: {tolerances}."
+    noisy = (
+        f"A single snapshot is noisy: values are near {n['mean_value']:g} and their differences some units. "
+        f"{_percent(n['snapshots_beyond'])} of DDQN's snapshots after episode 400 are more than 5 % below the optimum."
+    )
+    return _listed([constant, explored, of_learners, verdicts, noisy])
+
+
+def target_list(published: Path) -> str:
+    """What else is to be said of Fig. 5(b)."""
+    n, names = _numbers(published)["fig5b"], ("tlwd", "dpr", "ddqn", "q_learning")
+    sent = ", ".join(f"{LABELS[name]} {n[f'packets_{name}']:.3g}" for name in names)
+    missed = ", ".join(f"{LABELS[name]} {n[f'miss_{name}']:.3g}" for name in names)
+    of_learners = (
+        f"Mean gaps after the first episode: {_gaps_of(n, 'first', names)}; in episodes 51 to 100: "
+        f"{_gaps_of(n, 'early', names)}; after episode 400: {_gaps_of(n, 'late', names)}."
+    )
+    constant = f"The best action that ignores the state has a gap of {_percent(n['constant_gap'])}."
+    return _listed([of_learners, constant, f"Packets per episode: {sent}. Miss detection: {missed}."])
+
+
+def points_list(figure: str, published: Path) -> str:
+    """What else is to be said of one of Figs. 6 to 8, from its plotted numbers."""
+    plotted = pd.read_csv(published / FIGURES / f"{figure}.csv")
+    reward, miss = (
+        plotted[plotted.panel == panel].pivot_table(index="x", columns="algorithm", values="mean") for panel in "ac"
+    )
+    rivals = reward[["tlwd", "dpr", "ddqn"]]
+    best, worst = (Counter(rivals.columns[place(rivals.to_numpy(), axis=1)]) for place in (np.argmax, np.argmin))
+    ranks = "; ".join(f"{LABELS[name]} at {best[name]} and {worst[name]}" for name in ("tlwd", "dpr", "ddqn"))
+    lead = (reward.tlwd - reward[["dpr", "ddqn"]].max(axis=1)) / reward.optimum.abs()
+    sentences = [
+        f"Points of {len(rivals)} at which the mean reward is the highest and the lowest: {ranks}.",
+        f"TLwD's lead over the better of the others lies between {_percent(lead.min())} and {_percent(lead.max())} "
+        "of the optimum.",
+        f"The best policy that ignores the state misses at most {_percent((1 - miss.constant / miss.ddqn).max())} less "
+        "than DDQN at any point.",
+    ]
+    return _listed(sentences)
+
+
+def headline(published: Path) -> str:
+    """The first page's sentences on the default readings."""
+    found = {j.claim: j for j in judgements(published)}
+    numbers, verdict = _numbers(published)["fig5b"], {claim: words.verdict(j) for claim, j in found.items()}
+    counts = Counter(j.verdict for j in found.values())
+    tally = ", ".join(f"{counts[each]} are {each}" for each in VERDICTS)
+    text = (
+        f"Of the {len(found)} statements that the paper's claims come down to, {tally} under the default readings. "
+        f"That TLwD converges faster than DDQN is {verdict['C3 (TLwD)']}; that it earns most at every point is "
+        f"{verdict['C5 (highest)']} in Fig. 6 and {verdict['C13 (highest)']} in Fig. 8. After episode 400 the policies "
+        f"in the target are below the exact optimum by: {_gaps_of(numbers, 'late', ('tlwd', 'dpr', 'ddqn'))}."
+    )
+    return _wrapped(text)[2:].replace("\n  ", "\n")
+
+
+def robustness_list(published: Path) -> str:
+    """What many seeds say of the target."""
+    folder = published / ROBUSTNESS
+    regret, wrong = (pd.read_csv(folder / f"{name}.csv") for name in ("regret", "misranking"))
+    better = pd.read_csv(folder / "improvement.csv").query("environment == 'target' and score == 'reward'")
+    target = regret.query("figure == 'target'").set_index("algorithm")
+    lost = ", ".join(
+        f"{LABELS[name]} {target.regret[name]:.2f} ({target.regret_low[name]:.2f} to {target.regret_high[name]:.2f})"
+        for name in ("tlwd", "dpr", "ddqn")
+    )
+    pairs = better.set_index(["algorithm", "other"])
+    wins = ", ".join(
+        f"{LABELS[a]} over {LABELS[b]} {_percent(row.probability)} ({100 * row.low:.3g} to {100 * row.high:.3g})"
+        for a, b in (("tlwd", "ddqn"), ("dpr", "ddqn"))
+        for row in [pairs.loc[(a, b)]]
+    )
+    by_reward = wrong.query("environment == 'target' and score == 'reward'").set_index("study_seeds").misranking
+    misled = ", ".join(f"{n} seeds {_percent(by_reward[n])}" for n in by_reward.index)
+    reached = ", ".join(f"{LABELS[name]} {_percent(target.reached[name])}" for name in ("tlwd", "dpr", "ddqn"))
+    stays = "median_episodes_low" in target  # tables of older versions count runs that leave again
+    return (
+        f"{target.n_seeds.max()} seeds ([tables](published/robustness)) say of the target environment:\n\n"
+        + _listed(
+            [
+                *([f"Runs that get within 5 % of the optimum and stay there: {reached}."] if stays else []),
+                f"Exact regret per slot of the last policy: {lost}.",
+                f"Probability that a run earns more than another learner's: {wins}.",
+                f"How often a smaller study ranks the four learners by reward differently than all seeds: {misled}.",
+            ]
         )
-    return words
+    )
 
 
-def quoted_of_ablation(data: xr.Dataset) -> dict[str, str]:
-    """What TLwD reaches with parts left out."""
-    return {
-        name: f"mean gap after its first episode {gaps(data, 'tlwd', point)[:, 0].mean():.3g}, "
-        f"after episode 400 {gaps(data, 'tlwd', point)[:, 400:].mean():.3g}"
-        for point, name in enumerate(VARIANTS)
-    }
-
-
-def quoted_of_demonstrations(seeds: int = 16, episodes: int = 300) -> dict[str, str]:
-    """How good TLwD gets in the target with demonstrations from the source, and with demonstrations from the target."""
-    target, config = paper_params("target"), Config(episodes=episodes)
-    optimum = exact.evaluate_policy(target, exact.optimal_policy(target)).reward
-
-    def policy_reward(environments, key):
-        done = transfer(key, *environments, config=config, learners=("tlwd",))
-        return done.logs["tlwd"].policy_reward[episodes // 2 :].mean()
-
-    run = parallel.over_agents(policy_reward)
-    keys = jax.random.split(jax.random.key(0), parallel.padded(seeds))
-    gap = {
-        f"demonstrations from the {name}": 1 - float(run((source, target), keys)[:seeds].mean() / optimum)
-        for name, source in (("source", paper_params("source")), ("target", target))
-    }
-    return {name: f"mean gap in episodes {episodes // 2 + 1} to {episodes} {value:.3g}" for name, value in gap.items()}
-
-
-def main() -> int:
-    """Prints the tables and the numbers; returns the exit status."""
-    parallel.use_all_cores()
-    parallel.keep_compiled()
-    out = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
-    try:
-        claims = json.loads((out / "claims.json").read_text())
-        folder = results_folder(out, Size())
-        source, target = (store.load(folder / name, claims[0]["n_seeds"]) for name in ("fig5a", "fig5b"))
-    except OSError as error:
-        print(f"error: {error}; run `make figures` first", file=sys.stderr)
-        return 2
-    for figure in FIGURES:
-        print(f"\n{figure.title}\n\n{claims_table(claims, figure.name.removeprefix('fig'))}")
-    if (MULTIVERSE / "claims.csv").exists():
-        print(f"\nunder other readings\n\n{readings_table(claims, pd.read_csv(MULTIVERSE / 'claims.csv'))}")
-    sections = {"in the source": quoted_of_source(source), "in the target": quoted_of_target(target)}
-    if (folder / "ablation").exists():
-        sections["TLwD with parts left out"] = quoted_of_ablation(store.load(folder / "ablation", Size().seeds))
-    sections["TLwD, 16 seeds x 300 episodes"] = quoted_of_demonstrations()
-    for title, numbers in sections.items():
-        print(f"\n{title}")
-        for name, value in numbers.items():
-            print(f"{name}: {value}")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+BLOCKS: dict[str, Callable[[Path], str]] = {
+    "headline": headline,
+    "verdicts": verdicts_table,
+    "supported": supported_list,
+    **{
+        f"claims-{figure}": lambda published, figure=figure: claims_table(judgements(published), figure)
+        for figure in ("5a", "5b", "6", "7", "8", "9")
+    },
+    "source": source_list,
+    "target": target_list,
+    **{figure: functools.partial(points_list, figure) for figure in ("fig6", "fig7", "fig8")},
+    "robustness": robustness_list,
+}
+"""Name of a marked part to what makes it from the folder of published results."""

@@ -17,13 +17,15 @@ import xarray as xr
 from jrcjax.model.params import EnvParams
 from jrcjax.model.presets import ENVIRONMENTS, PRESETS
 from jrcjax.types import READINGS
+from paper_figs.claims import words
 from paper_figs.claims.judge import Judgement
+from paper_figs.claims.results import Rules
 from sweeps.preset import environment_of, label_of
 from sweeps.sweep import Size
 
 _TEMPLATE = Path(__file__).with_name("report.html.jinja")
 _OPTIMUM = ("reward", "throughput", "miss_detection")
-VERDICTS = {"supported": "✓", "contradicted": "✗", "undecided": "?"}
+SIGNS = {"supported": "✓", "contradicted": "✗", "undecided": "?"}
 """Signs of the verdicts, which are told apart without their colours."""
 
 
@@ -65,15 +67,21 @@ def render(
     environment = jinja2.Environment(
         autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    environment.filters["number"] = _number
+    environment.filters |= {
+        "number": _number,
+        "short": words.number,
+        "criterion": words.criterion,
+        "interval": words.interval,
+    }
     return environment.from_string(_TEMPLATE.read_text()).render(
         size=size,
         preset=label_of(size.preset),
         file=None if size.preset in PRESETS else size.preset,
         figures=figures,
         claims=[(claim, _figure_of(claim, figures)) for claim in claims],
-        counts={verdict: sum(claim.verdict == verdict for claim in claims) for verdict in VERDICTS},
-        signs=VERDICTS,
+        counts={verdict: sum(claim.verdict == verdict for claim in claims) for verdict in SIGNS},
+        signs=SIGNS,
+        least_seeds=Rules().least_seeds,
         environments=_environments(size.preset),
         optima=optima,
         diverged=diverged,

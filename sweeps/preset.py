@@ -90,6 +90,11 @@ def _radar(name: str, table: dict[str, Any]) -> dict[str, Any]:
     return table
 
 
+def slots_of(preset: str) -> int:
+    """Slots of an episode, in the source as in the target."""
+    return environment_of("target", preset).max_steps_in_episode
+
+
 def label_of(preset: str) -> str:
     """A short name of a preset, for folders and titles."""
     return preset if preset in PRESETS else f"file-{hashlib.sha256(preset.encode()).hexdigest()[:8]}"

@@ -11,7 +11,7 @@ from jrcjax.learners.hparams import Config, HParams
 from jrcjax.model.params import EnvParams
 from jrcjax.model.presets import PRESETS
 from jrcjax.types import choice
-from sweeps.preset import check_preset
+from sweeps.preset import check_preset, label_of
 
 MOST_SEEDS = 1_000_000
 """Whose numbers fit the names of parts."""
@@ -102,8 +102,8 @@ class Study:
 def size_of(seeds: int | None, episodes: int | None, preset: str, smoke: bool, study: Study | None = None) -> Size:
     """The size that command-line options ask for."""
     usual, tiny, presets = (study.size, study.smoke_size, study.presets) if study else (Size(), SMOKE, PRESETS)
-    if preset in PRESETS:
-        choice("preset", preset, presets)
+    if preset in PRESETS or presets != PRESETS:
+        choice("preset", label_of(preset), presets)
     size = replace(tiny if smoke else usual, preset=preset)
     given = {"seeds": seeds, "episodes": episodes}
     return replace(size, **{name: value for name, value in given.items() if value is not None})

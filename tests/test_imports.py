@@ -14,11 +14,12 @@ FLOORS = (
     ("radar",),
     ("model", "events"),
     ("exact", "render"),
+    ("front",),
     ("replay",),
     ("learners",),
     ("training",),
     ("agents", "config", "adapters"),
-    ("__init__",),
+    ("__init__", "__main__"),
     ("sweeps",),
     ("paper_figs",),
 )

@@ -106,6 +106,11 @@ def convergence_episode(
     return arrivals(gap, tolerance + chance_of_a_window(gap))
 
 
+def episodes_before(data: xr.Dataset, algorithm: str, point: int = 0) -> np.ndarray:
+    """Episodes of each run before it converges, [seeds]; all of its episodes where it never does. Runs rank by it."""
+    return np.minimum(convergence_episode(data, algorithm, point) - 1, data.sizes["episode"])
+
+
 class SampleComplexity(NamedTuple):
     """Episodes until a learner has converged, over seeds. Runs that never do are censored at their end.
 

@@ -10,8 +10,8 @@ import pandas as pd
 import xarray as xr
 from scipy import stats
 
+from paper_figs.analysis.scores import mean_over_episodes
 from paper_figs.analysis.statistics import CONFIDENCE
-from paper_figs.claims.judge import first
 
 _STUDIES = 10_000  # drawn per size
 
@@ -49,7 +49,7 @@ def needed_table(data: xr.Dataset, figure: str) -> pd.DataFrame:
     """Seeds needed to rank each two learners at each point of a figure, by means over all episodes."""
     rows = []
     for metric in ("reward", "throughput", "miss_detection"):
-        of = {name: first(data, metric, name) for name in data["algorithm"].values}
+        of = {name: mean_over_episodes(data, metric, name) for name in data["algorithm"].values}
         for a, b in itertools.combinations(of, 2):
             for point in range(data.sizes["point"]):
                 differences = of[a][:, point] - of[b][:, point]

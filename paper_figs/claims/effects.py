@@ -133,8 +133,11 @@ class RelativeLevel:
 
 
 @dataclass(frozen=True)
-class MovesLess:
-    """By how much a learner's change, in either direction, stays below a share of another's rise."""
+class HardlyMoves:
+    """The room that a learner's change between two values leaves below two bounds, as a share of its level.
+
+    The bounds are a share of its own level and the same share of another's rise; the change is one in either direction.
+    """
 
     metric: str
     of: str
@@ -145,13 +148,11 @@ class MovesLess:
 
     def __call__(self, results: Results) -> Measured:
         end, start = results.point(self.at), results.point(self.over)
-        changes = [(values := results.score(self.metric, name))[:, end] - values[:, start] for name in self._both]
-        mine, bound = changes[0], self.share * changes[1]
-        return Measured(every_point(np.stack([bound - mine, bound + mine], axis=1)))
-
-    @property
-    def _both(self) -> tuple[str, str]:
-        return self.of, self.than
+        mine, other = (results.score(self.metric, name) for name in (self.of, self.than))
+        change, rise, level = mine[:, end] - mine[:, start], other[:, end] - other[:, start], mine[:, start]
+        bounds = (self.share * level, self.share * rise)
+        room = np.stack([bound + sign * change for bound in bounds for sign in (-1.0, 1.0)], axis=1)
+        return Measured(every_point(room / np.abs(level.mean())))
 
 
 @dataclass(frozen=True)
@@ -189,8 +190,7 @@ class Roughness:
         return Measured(mean_effect(mine - other), "reward", differences)
 
     def _of(self, results: Results, name: str) -> np.ndarray:
-        reward = results.data["reward"].sel(algorithm=name).isel(point=0, episode=slice(EARLY))
-        return np.diff(reward.transpose("seed", "episode").values.astype(float), axis=1).std(axis=1)
+        return np.diff(results.rewards(Agent(name))[:, :EARLY], axis=1).std(axis=1)
 
 
 @dataclass(frozen=True)

@@ -181,9 +181,21 @@ def _number(value: Any) -> Any:
 
 
 def from_json(rows: list[dict]) -> list[Judgement]:
-    """The judgements that `as_json` wrote; what was not finite is NaN."""
-    numbers = ("value", "ci_low", "ci_high")
-    return [
-        Judgement(**{key: math.nan if value is None and key in numbers else value for key, value in row.items()})
-        for row in rows
-    ]
+    """The judgements that `as_json` wrote. Where one limit is a number, what is null beside it is infinite."""
+    return [Judgement(**row | _finite_or_not(row)) for row in rows]
+
+
+def _finite_or_not(row: dict) -> dict[str, Any]:
+    low, high = row["ci_low"], row["ci_high"]
+    bounded = low is not None or high is not None
+    limit = row["limit"]
+    return {
+        "value": _restored(row["value"], math.inf if bounded else math.nan),
+        "ci_low": _restored(low, -math.inf if bounded else math.nan),
+        "ci_high": _restored(high, math.inf if bounded else math.nan),
+        "limit": tuple(limit) if isinstance(limit, list) else limit,
+    }
+
+
+def _restored(value: float | None, otherwise: float) -> float:
+    return otherwise if value is None else value

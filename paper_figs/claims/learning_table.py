@@ -27,9 +27,13 @@ MUCH_FASTER = 2.0
 """Who converges much faster needs less than half of the episodes."""
 SETTLED = 400
 """Episode after which the paper calls the source agent's curve stable."""
+TLWD, DPR, DDQN = Agent("tlwd"), Agent("dpr"), Agent("ddqn")
 PRIORITISED, UNIFORM = Agent("tlwd", 1.0), Agent("tlwd", 0.0)
-TRANSFER, SWEEPS, REPLAY = "VII-B.1", "VII-B.2", "VII-B.3"
-"""The paper's sections on Fig. 5, on Figs. 6 to 8, and on Fig. 9."""
+SWEEPS = "VII-B.2"
+"""The paper's section on Figs. 6 to 8."""
+_FIG5A, _FIG5B, _FIG6A, _FIG9 = ("5a", "VII-B.1"), ("5b", "VII-B.1"), ("6a", SWEEPS), ("9", "VII-B.3")
+_AT = 0.8
+"""Value of p_1^v at which the paper counts episodes."""
 _OF_OPTIMUM, _REWARD = "share of the optimum", "reward per slot"
 
 
@@ -51,74 +55,106 @@ def with_curves(claims: Iterable[Claim]) -> Iterator[Claim]:
             )
 
 
-def _faster(claim: str, statement: str, figure: str, where: str, of: Agent, than: Agent) -> Claim:
+def _faster(claim: str, statement: str, where: tuple[str, str], of: Agent, than: Agent) -> Claim:
     effect = "probability that its policies converge earlier, with the same seed"
-    return Claim(claim, statement, figure, where, effect, EarlierConvergence(of, than), ">", 0.5, "probability")
+    return Claim(claim, statement, *where, effect, EarlierConvergence(of, than), ">", 0.5, "probability")
 
 
 def _much_faster(name: str) -> Claim:
     label, effect = LABELS[name], "probability that its policies need less than half of DDQN's episodes"
-    measure = EarlierConvergence(Agent(name), Agent("ddqn"), MUCH_FASTER)
-    statement = f"{label} converges much faster than DDQN"
-    return Claim(f"C3 ({label}, much)", statement, "5b", TRANSFER, effect, measure, ">", 0.5, "probability")
+    statement, measure = f"{label} converges much faster than DDQN", EarlierConvergence(Agent(name), DDQN, MUCH_FASTER)
+    return Claim(f"C3 ({label}, much)", statement, *_FIG5B, effect, measure, ">", 0.5, "probability")
 
 
-def _needs_about(
-    claim: str, statement: str, figure: str, where: str, name: str, episode: float, x: float | None = None
-) -> Claim:
-    effect, measure = "median episode in which its policies converge", TypicalEpisode(Agent(name, x))
-    return Claim(claim, statement, figure, where, effect, measure, "within", about(episode), "episode")
+def _needs_about(claim: str, statement: str, where: tuple[str, str], agent: Agent, episode: float) -> Claim:
+    effect = "median episode in which its policies converge"
+    return Claim(claim, statement, *where, effect, TypicalEpisode(agent), "within", about(episode), "episode")
 
 
-def _fails(environment: str, figure: str) -> Claim:
+def _needs_about_150(name: str) -> Claim:
+    label = LABELS[name]
+    statement = f"at p_1^v = {_AT} {label} needs about 150 episodes"
+    return _needs_about(f"C7 ({label})", statement, _FIG6A, Agent(name, _AT), 150.0)
+
+
+def _late_gap(claim: str, statement: str, where: tuple[str, str], name: str, relation: str) -> Claim:
+    effect, measure = f"mean gap of its policies after episode {SETTLED}", LateGap(Agent(name), SETTLED)
+    return Claim(claim, statement, *where, effect, measure, relation, TOLERANCE, _OF_OPTIMUM)
+
+
+def _fails(environment: str, where: tuple[str, str]) -> Claim:
     statement = f"Q-learning does not reach the optimal policy in the {environment}"
-    effect, measure = f"mean gap of its policies after episode {SETTLED}", LateGap(Agent("q_learning"), SETTLED)
-    claim = f"C2 (Q-learning, {environment})"
-    return Claim(claim, statement, figure, TRANSFER, effect, measure, ">", TOLERANCE, _OF_OPTIMUM)
+    return _late_gap(f"C2 (Q-learning, {environment})", statement, where, "q_learning", ">")
 
 
-def _is_last(environment: str, figure: str, others: tuple[str, ...]) -> Claim:
+def _is_last(environment: str, where: tuple[str, str], others: tuple[str, ...]) -> Claim:
     claim, statement = f"C2 (Round Robin, {environment})", f"Round Robin is the lower bound in the {environment}"
     measure = EveryLead("reward", "round_robin", others, sign=-1.0, at=0.0)
-    return Claim(claim, statement, figure, TRANSFER, "smallest lead of the others", measure, ">", 0.0, _REWARD)
+    return Claim(claim, statement, *where, "smallest lead of the others", measure, ">", 0.0, _REWARD)
 
 
-_TARGET_OTHERS = ("tlwd", "dpr", "ddqn", "q_learning")
-# fmt: off
 _SOURCE = (
-    Claim("C1 (reached)", "DDQN reaches the optimal policy in the source", "5a", TRANSFER,
-          f"mean gap of its policies after episode {SETTLED}", LateGap(Agent("ddqn"), SETTLED), "<", TOLERANCE, _OF_OPTIMUM),
-    _needs_about("C1 (about 200)", "DDQN reaches it after about 200 episodes", "5a", TRANSFER, "ddqn", 200.0),
-    Claim("C1 (stable)", "DDQN is stable after 400 episodes", "5a", TRANSFER,
-          f"deviation of its policies' means over 20 episodes after episode {SETTLED}",
-          Movement(Agent("ddqn"), SETTLED), "<", TOLERANCE, _OF_OPTIMUM),
-    _fails("source", "5a"),
-    _is_last("source", "5a", ("ddqn", "q_learning")),
+    _late_gap("C1 (reached)", "DDQN reaches the optimal policy in the source", _FIG5A, "ddqn", "<"),
+    _needs_about("C1 (about 200)", "DDQN reaches it after about 200 episodes", _FIG5A, DDQN, 200.0),
+    Claim(
+        "C1 (stable)",
+        f"DDQN is stable after {SETTLED} episodes",
+        *_FIG5A,
+        f"deviation of its policies' means over 20 episodes after episode {SETTLED}",
+        Movement(DDQN, SETTLED),
+        "<",
+        TOLERANCE,
+        _OF_OPTIMUM,
+    ),
+    _fails("source", _FIG5A),
+    _is_last("source", _FIG5A, ("ddqn", "q_learning")),
 )
 _TARGET = (
-    _fails("target", "5b"),
-    _is_last("target", "5b", _TARGET_OTHERS),
-    *(_faster(f"C3 ({LABELS[name]})", f"{LABELS[name]} converges faster than DDQN", "5b", TRANSFER, Agent(name), Agent("ddqn"))
-      for name in ("tlwd", "dpr")),
-    *(_much_faster(name) for name in ("tlwd", "dpr")),
-    *(_needs_about(f"C3 ({LABELS[name]}, about 100)", f"{LABELS[name]} converges from about episode 100", "5b", TRANSFER, name, 100.0)
-      for name in ("tlwd", "dpr")),
-    Claim("C4 (reward)", "TLwD earns more than DPR in the first 100 episodes", "5b", TRANSFER,
-          "reward of episodes 1 to 100, TLwD less DPR", EarlyLead(Agent("tlwd"), Agent("dpr")), ">", 0.0, _REWARD),
-    Claim("C4 (steadiness)", "TLwD is steadier than DPR in the first 100 episodes", "5b", TRANSFER,
-          "deviation of the reward's change between episodes, TLwD less DPR", Roughness("tlwd", "dpr"), "<", 0.0, _REWARD),
+    _fails("target", _FIG5B),
+    _is_last("target", _FIG5B, ("tlwd", "dpr", "ddqn", "q_learning")),
+    _faster("C3 (TLwD)", "TLwD converges faster than DDQN", _FIG5B, TLWD, DDQN),
+    _faster("C3 (DPR)", "DPR converges faster than DDQN", _FIG5B, DPR, DDQN),
+    _much_faster("tlwd"),
+    _much_faster("dpr"),
+    _needs_about("C3 (TLwD, about 100)", "TLwD converges from about episode 100", _FIG5B, TLWD, 100.0),
+    _needs_about("C3 (DPR, about 100)", "DPR converges from about episode 100", _FIG5B, DPR, 100.0),
+    Claim(
+        "C4 (reward)",
+        "TLwD earns more than DPR in the first 100 episodes",
+        *_FIG5B,
+        "reward of episodes 1 to 100, TLwD less DPR",
+        EarlyLead(TLWD, DPR),
+        ">",
+        0.0,
+        _REWARD,
+    ),
+    Claim(
+        "C4 (steadiness)",
+        "TLwD is steadier than DPR in the first 100 episodes",
+        *_FIG5B,
+        "deviation of the reward's change between episodes, TLwD less DPR",
+        Roughness("tlwd", "dpr"),
+        "<",
+        0.0,
+        _REWARD,
+    ),
 )
-_AT = 0.8
-"""Value of p_1^v at which the paper counts episodes."""
 _HIGH_SPEED = (
-    _needs_about("C7 (DDQN)", "at p_1^v = 0.8 DDQN needs about 400 episodes", "6a", SWEEPS, "ddqn", 400.0, _AT),
-    *(_needs_about(f"C7 ({LABELS[name]})", f"at p_1^v = 0.8 {LABELS[name]} needs about 150 episodes", "6a", SWEEPS, name, 150.0, _AT)
-      for name in ("tlwd", "dpr")),
+    _needs_about("C7 (DDQN)", f"at p_1^v = {_AT} DDQN needs about 400 episodes", _FIG6A, Agent("ddqn", _AT), 400.0),
+    _needs_about_150("tlwd"),
+    _needs_about_150("dpr"),
 )
-_PRIORITISED = (
-    _faster("C15 (episodes)", "prioritised replay converges faster than uniform sampling", "9", REPLAY, PRIORITISED, UNIFORM),
-    Claim("C15 (reward)", "prioritised replay earns more in the first 100 episodes", "9", REPLAY,
-          "reward of episodes 1 to 100, prioritised less uniform", EarlyLead(PRIORITISED, UNIFORM), ">", 0.0, _REWARD),
+_REPLAY = (
+    _faster("C15 (episodes)", "prioritised replay converges faster than uniform sampling", _FIG9, PRIORITISED, UNIFORM),
+    Claim(
+        "C15 (reward)",
+        "prioritised replay earns more in the first 100 episodes",
+        *_FIG9,
+        "reward of episodes 1 to 100, prioritised less uniform",
+        EarlyLead(PRIORITISED, UNIFORM),
+        ">",
+        0.0,
+        _REWARD,
+    ),
 )
-# fmt: on
-LEARNING_CLAIMS = tuple(with_curves((*_SOURCE, *_TARGET, *_HIGH_SPEED, *_PRIORITISED)))
+LEARNING_CLAIMS = tuple(with_curves((*_SOURCE, *_TARGET, *_HIGH_SPEED, *_REPLAY)))

@@ -92,6 +92,12 @@ class Results:
         self._require(algorithm)
         return mean_over_episodes(self.data, metric, algorithm, episodes)
 
+    def rewards(self, agent: Agent) -> np.ndarray:
+        """Simulated reward per slot of each episode, [seeds, episodes]."""
+        self._require(agent.name)
+        reward = self.data["reward"].sel(algorithm=agent.name).isel(point=self.point(agent.x))
+        return reward.transpose("seed", "episode").values.astype(float)
+
     def optimum(self) -> np.ndarray:
         """The exact optimal reward per slot at each point, [points]."""
         return self.data["optimum_reward"].values.astype(float)

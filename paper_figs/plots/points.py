@@ -6,13 +6,11 @@ import pandas as pd
 import xarray as xr
 from matplotlib.figure import Figure
 
-from jrcjax.model.params import EnvParams
 from paper_figs.analysis import divergence
 from paper_figs.analysis.statistics import mean_over_seeds
 from paper_figs.plots import style
 from paper_figs.plots.curves import COLUMNS
 
-_SLOTS = EnvParams.max_steps_in_episode
 PANELS = {
     "a": ("reward", "average reward per slot", 1),
     "b": ("throughput", "throughput (packets per episode)", None),
@@ -21,7 +19,7 @@ PANELS = {
 """Panel to the metric, its axis label, and what a long-run figure per slot is multiplied by: None for the slots."""
 
 
-def table(data: xr.Dataset, figure: str, x_name: str, slots: int = _SLOTS) -> pd.DataFrame:
+def table(data: xr.Dataset, figure: str, x_name: str, slots: int) -> pd.DataFrame:
     """The plotted numbers: means over all episodes, exploration included, and over seeds; and three exact lines.
 
     The interval is Student's t at 95 % over seeds. The exact lines have no seeds (n_seeds 0) and their interval is

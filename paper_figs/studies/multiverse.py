@@ -11,9 +11,8 @@ from matplotlib.figure import Figure
 
 from paper_figs.analysis import divergence
 from paper_figs.analysis.statistics import CONFIDENCE
-from paper_figs.claims.judge import Judgement
-from paper_figs.claims.learning_claims import replay_claims, source_claims, target_claims
-from paper_figs.claims.sweep_claims import density_claims, favourable_claims, speed_claims
+from paper_figs.claims import table
+from paper_figs.claims.judge import Judgement, is_on_its_side
 from paper_figs.plots import style
 from sweeps.studies.fig6 import FIG6
 from sweeps.studies.fig7 import FIG7
@@ -53,15 +52,8 @@ def claims_of(source: xr.Dataset, target: xr.Dataset) -> list[Judgement]:
       source: results in its source environment, one point.
       target: results at all of its POINTS.
     """
-    replay = _figure(target, FIG9).isel(point=[1, 0])  # prioritised first
-    return [
-        *source_claims(source),
-        *target_claims(target.isel(point=[0])),
-        *speed_claims(_figure(target, FIG6)),
-        *favourable_claims(_figure(target, FIG7)),
-        *density_claims(_figure(target, FIG8)),
-        *replay_claims(replay),
-    ]
+    swept = {sweep.name: _figure(target, sweep) for sweep in (FIG6, FIG7, FIG8, FIG9)}
+    return table.claims_of({"fig5a": source, "fig5b": target.isel(point=[0]), **swept})
 
 
 def verdicts(
@@ -80,7 +72,7 @@ def verdicts(
             here = source.isel(point=[number]), target.isel(point=points)
             n_diverged = sum(divergence.count(data, name) for data in here for name in data["algorithm"].values)
             for c in claims_of(*here):
-                holds = c.value >= c.limit if c.relation == ">=" else c.value <= c.limit
+                holds = is_on_its_side(c.value, c.relation, c.limit)
                 known = {"claim": c.claim, "value": c.value, "ci_low": c.ci_low, "ci_high": c.ci_high, "limit": c.limit}
                 about = {
                     "relation": c.relation,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -14,9 +15,9 @@ from matplotlib.figure import Figure
 from scipy import stats
 
 from paper_figs.analysis import divergence, ranking, regret
-from paper_figs.analysis.convergence import TOLERANCE, WINDOW, convergence_episode, gaps, sample_complexity
+from paper_figs.analysis.convergence import TOLERANCE, episodes_before, gaps, sample_complexity
+from paper_figs.analysis.scores import mean_over_episodes
 from paper_figs.analysis.statistics import CONFIDENCE, mean_over_seeds, proportion
-from paper_figs.claims.judge import first
 from paper_figs.plots import style
 
 STUDY_SIZES = (1, 3, 5, 10, 30, 100)
@@ -35,12 +36,14 @@ class Score(NamedTuple):
 
 
 SCORES: dict[str, Score] = {
-    "reward": Score(lambda data, name: first(data, "reward", name)[:, 0], 1),
-    "reward of the first 100 episodes": Score(lambda data, name: first(data, "reward", name, _EARLY)[:, 0], 1),
-    "throughput": Score(lambda data, name: first(data, "throughput", name)[:, 0], 1),
-    "miss_detection": Score(lambda data, name: first(data, "miss_detection", name)[:, 0], -1),
+    "reward": Score(lambda data, name: mean_over_episodes(data, "reward", name)[:, 0], 1),
+    f"reward of the first {_EARLY} episodes": Score(
+        lambda data, name: mean_over_episodes(data, "reward", name, _EARLY)[:, 0], 1
+    ),
+    "throughput": Score(lambda data, name: mean_over_episodes(data, "throughput", name)[:, 0], 1),
+    "miss_detection": Score(lambda data, name: mean_over_episodes(data, "miss_detection", name)[:, 0], -1),
     "exact gap of the last 100 episodes": Score(lambda data, name: gaps(data, name)[:, -_EARLY:].mean(axis=1), -1),
-    "convergence episode": Score(convergence_episode, -1),
+    "episodes before convergence": Score(episodes_before, -1),
 }
 
 
@@ -125,21 +128,20 @@ def profiles(data: xr.Dataset, environment: str) -> pd.DataFrame:
         grid = np.round(np.linspace(0.0, 0.3, 61), 3)
         share = proportion((late[:, None] <= grid).sum(axis=0), len(late))
         rows += [(environment, "gap", name, *row, len(late)) for row in zip(grid, *share[:3], strict=True)]
-        if data.sizes["episode"] >= WINDOW:
-            sample = sample_complexity(data, name)
-            steps = [*zip(sample.episodes, *sample.share[:3], strict=True), (data.sizes["episode"], *sample.reached)]
-            rows += [(environment, "converged", name, *row, len(late)) for row in steps]
+        sample = sample_complexity(data, name)
+        steps = [*zip(sample.episodes, *sample.share, strict=True), (data.sizes["episode"], *sample.reached)]
+        rows += [(environment, "converged", name, *row, len(late)) for row in steps]
     return pd.DataFrame(rows, columns=["environment", "profile", "algorithm", "x", "share", "low", "high", "n_seeds"])
 
 
-def tables(environments: dict[str, xr.Dataset]) -> dict[str, pd.DataFrame]:
+def tables(environments: dict[str, xr.Dataset], slots: int) -> dict[str, pd.DataFrame]:
     """All tables of a study, by name; each has a column with the environment."""
     makers = {
         "distribution": distributions,
         "improvement": improvements,
         "misranking": misrankings,
         "profile": profiles,
-        "regret": regret.table,
+        "regret": functools.partial(regret.table, slots=slots),
         "seeds_needed": ranking.needed_table,
     }
     return {
@@ -188,7 +190,7 @@ def _draw_shares(axes: Axes, profile: pd.DataFrame, scale: float) -> None:
 
 def _draw_misrankings(axes: Axes, wrong: pd.DataFrame) -> None:
     """How often studies of n seeds rank the learners differently, by what they are ranked by."""
-    looks = {"reward": "-o", "throughput": "--s", "miss_detection": "-.^", "convergence episode": ":D"}
+    looks = {"reward": "-o", "throughput": "--s", "miss_detection": "-.^", "episodes before convergence": ":D"}
     for score, look in looks.items():
         curve = wrong.query(f"score == {score!r}")
         axes.plot(curve.study_seeds, curve.misranking, look, color="black", label=score.replace("_", " "))

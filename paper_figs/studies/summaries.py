@@ -10,6 +10,7 @@ import pandas as pd
 
 from paper_figs.plots import style
 from paper_figs.studies import multiverse, robustness
+from sweeps.preset import slots_of
 from sweeps.results import store
 from sweeps.studies.multiverse import LEVELS, MULTIVERSE, UNIVERSES, grouped
 from sweeps.studies.robustness import SOURCE, TARGET
@@ -40,7 +41,7 @@ def summarise_robustness(sweeps: tuple[Sweep, ...], size: Size, out: Path) -> li
     folder = out / "robustness" / "summary"
     folder.mkdir(parents=True, exist_ok=True)
     results = {"source": store.load(out / SOURCE.name, size.seeds), "target": store.load(out / TARGET.name, size.seeds)}
-    tables = robustness.tables(results)
+    tables = robustness.tables(results, slots_of(size.preset))
     pictures = style.save(robustness.draw(tables), folder / "robustness")
     return [*_write(folder, tables), *pictures, _manifests(folder, sweeps, out)]
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from jrcjax.machine import usable_cores
-from jrcjax.model.params import EnvParams
 from jrcjax.training import parallel
+from sweeps.preset import slots_of
 from sweeps.sweep import Size, Sweep
 
 # Core time of one agent in one slot, microseconds, on the machine of the README's table of speeds.
 _CORE_US = {"tlwd": 6.5, "dpr": 2.8, "ddqn": 2.8, "q_learning": 0.4, "round_robin": 0.2}
-_SLOTS = EnvParams.max_steps_in_episode
 
 
 def _seconds_per_slot(sweep: Sweep, seeds: int, learners: tuple[str, ...]) -> float:
@@ -17,9 +16,9 @@ def _seconds_per_slot(sweep: Sweep, seeds: int, learners: tuple[str, ...]) -> fl
     return agents * sum(_CORE_US[name] for name in learners) * 1e-6 / usable_cores()
 
 
-def seconds_per_episode(sweep: Sweep, seeds: int) -> float:
+def seconds_per_episode(sweep: Sweep, size: Size, seeds: int) -> float:
     """Seconds for one episode of so many seeds at all points."""
-    return _SLOTS * _seconds_per_slot(sweep, seeds, sweep.learners)
+    return slots_of(size.preset) * _seconds_per_slot(sweep, seeds, sweep.learners)
 
 
 def pretraining_seconds(sweep: Sweep, size: Size, seeds: int) -> float:
@@ -29,7 +28,7 @@ def pretraining_seconds(sweep: Sweep, size: Size, seeds: int) -> float:
 
 def block_seconds(sweep: Sweep, size: Size, seeds: int) -> float:
     """Seconds for so many seeds at all points, from start to end."""
-    return pretraining_seconds(sweep, size, seeds) + size.episodes * seconds_per_episode(sweep, seeds)
+    return pretraining_seconds(sweep, size, seeds) + size.episodes * seconds_per_episode(sweep, size, seeds)
 
 
 def in_words(seconds: float) -> str:

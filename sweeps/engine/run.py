@@ -197,7 +197,7 @@ def results_of(
             advance(estimate.pretraining_seconds(sweep, size, len(seeds)))
         logs.append(chunk.log)
         groups = chunk.groups
-        advance(chunk.episodes * estimate.seconds_per_episode(sweep, len(seeds)))
+        advance(chunk.episodes * estimate.seconds_per_episode(sweep, size, len(seeds)))
     if keep:
         keep(groups)
     whole = jax.tree.map(lambda *parts: np.concatenate(parts, axis=-1), *logs)

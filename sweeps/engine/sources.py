@@ -92,7 +92,7 @@ def trained(sweep: Sweep, size: Size, seeds: range, advance: Callable[[float], N
     for chunk in run_block(sweep, size, points, seeds, None):
         logs.append(chunk.log)
         groups = chunk.groups
-        advance(chunk.episodes * seconds_per_episode(sweep, len(seeds)))
+        advance(chunk.episodes * seconds_per_episode(sweep, size, len(seeds)))
     log = jax.tree.map(lambda *parts: np.concatenate(parts, axis=-1), *logs)
     hand_on = _hand_on(spec_of_points(points), sweep.config(size))
     shape = (len(sweep.x_values), len(seeds))

@@ -34,7 +34,7 @@ class Options:
 
     vary: Annotated[str, tyro.conf.arg(metavar="PATH=VALUES", help_behavior_hint="")] = ""
     """The parameter on the x axis and its values: start:stop:count, start:stop:count:log, or a list with commas.
-    Such as env.speed.event_probability.high=0.1:0.9:9; the parameters are in jrcjax/CONFIGURATION.md."""
+    Such as env.speed.event_probability.high=0.1:0.9:9; the parameters are in jrcjax/config/CONFIGURATION.md."""
     set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="PATH=VALUE ...", help_behavior_hint="")] = ()
     """Other parameters that differ from the base, the same at all points."""
     learners: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("ddqn",)

@@ -1,15 +1,10 @@
 """The README's code runs as written, and its table and paths are what the project holds."""
 
-import json
 import re
 from pathlib import Path
 
-from paper_figs.figures import FIGURES
-from paper_figs.readme import claims_table
-
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text()
-RESULTS = (ROOT / "paper_figs" / "README.md").read_text()
 
 
 def test_the_code_runs_as_written_one_block_after_the_other(capsys, tmp_path, monkeypatch):
@@ -21,18 +16,6 @@ def test_the_code_runs_as_written_one_block_after_the_other(capsys, tmp_path, mo
     for block in blocks:
         exec(compile(block, "README.md", "exec"), names)
     assert "(9, 5) (9, 5)" in capsys.readouterr().out
-
-
-def test_claims_table_is_that_of_the_committed_results():
-    claims = json.loads((ROOT / "published" / "figures" / "claims.json").read_text())
-    for figure in FIGURES:
-        assert claims_table(claims, figure.name.removeprefix("fig")) in RESULTS
-
-
-def test_every_claim_is_in_one_of_the_tables():
-    claims = json.loads((ROOT / "published" / "figures" / "claims.json").read_text())
-    tables = [claims_table(claims, figure.name.removeprefix("fig")) for figure in FIGURES]
-    assert sum(table.count("\n") - 1 for table in tables) == len(claims)
 
 
 def test_every_path_exists():

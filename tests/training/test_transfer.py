@@ -239,7 +239,7 @@ def nothing_runs(monkeypatch):
     def refuse(*_):
         raise AssertionError("checks come before any work")
 
-    for name in ("training", "transfer"):
+    for name in ("training.train", "training.transfer"):
         for function in ("train_source", "init_agent", "run_episodes"):
             monkeypatch.setattr(sys.modules[f"jrcjax.{name}"], function, refuse)
 

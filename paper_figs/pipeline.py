@@ -1,0 +1,110 @@
+"""From nothing to all files: runs the sweeps that are missing, then draws, judges and writes."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pandas as pd
+import xarray as xr
+from rich.console import Console
+
+from paper_figs import report
+from paper_figs.analysis import divergence, ranking, regret
+from paper_figs.claims.judge import Judgement, as_json
+from paper_figs.claims.table import claims_of
+from paper_figs.figures import FIGURES, NUMBERS, PaperFigure
+from paper_figs.plots import style
+from sweeps.engine.estimate import in_words
+from sweeps.engine.run import expected_seconds, run_sweep
+from sweeps.preset import label_of, slots_of
+from sweeps.results import store
+from sweeps.studies.registry import SWEEPS
+from sweeps.sweep import Size
+
+
+def results_folder(out: Path, size: Size) -> Path:
+    """Where results of one preset and length lie, so that runs of different ones don't meet."""
+    return out / "results" / f"{label_of(size.preset)}-{size.episodes}-episodes"
+
+
+def chosen(numbers: tuple[int, ...]) -> list[PaperFigure]:
+    """The figures with these numbers, all if there are none.
+
+    Raises:
+      ValueError: unknown numbers.
+    """
+    unknown = sorted(set(numbers) - set(NUMBERS))
+    if unknown:
+        raise ValueError(f"only: {unknown}; allowed: {', '.join(map(str, NUMBERS))}")
+    return [figure for figure in FIGURES if not numbers or figure.number in numbers]
+
+
+@dataclass
+class _Written:
+    """What has been written of all figures, and what the files about all of them need."""
+
+    files: list[Path] = field(default_factory=list)
+    pictures: dict[str, Path] = field(default_factory=dict)
+    manifests: dict[str, str] = field(default_factory=dict)
+
+
+def make_figures(numbers: tuple[int, ...], size: Size, out: Path, console: Console) -> list[Path]:
+    """Runs the sweeps that are missing, then writes all files of the figures with these numbers.
+
+    Raises:
+      ValueError: unknown figures, bad sizes, or results of another configuration in `out`.
+    """
+    wanted = chosen(numbers)
+    size.check()
+    out.mkdir(parents=True, exist_ok=True)
+    folder = results_folder(out, size)
+    seconds = expected_seconds([SWEEPS[figure.name] for figure in wanted], size, folder)
+    console.print(
+        f"figures: {len(wanted)}, seeds: {size.seeds}, episodes: {size.episodes}; about {in_words(seconds)} in all"
+    )
+    written, results, slots = _Written(), {}, slots_of(size.preset)
+    for figure in wanted:
+        found = run_sweep(SWEEPS[figure.name], size, folder, console, resume=True)
+        results[figure.name] = store.load(found, size.seeds)
+        _write_figure(figure, results[figure.name], slots, out, written)
+        written.manifests[figure.name] = (found / store.MANIFEST).read_text()
+    _write_tables(results, slots, out, written)
+    _write_verdicts(results, size, out, written)
+    return written.files
+
+
+def _write_figure(figure: PaperFigure, data: xr.Dataset, slots: int, out: Path, written: _Written) -> None:
+    table = figure.table(data, slots)
+    path = out / f"{figure.name}.csv"
+    table.to_csv(path, index=False, float_format="%.6g")
+    files = style.save(figure.draw(table, figure.title), out / figure.name)
+    written.files += [path, *files]
+    written.pictures[figure.title] = files[-1]
+
+
+def _write_tables(results: dict[str, xr.Dataset], slots: int, out: Path, written: _Written) -> None:
+    tables = {
+        "regret": [regret.table(data, name, slots) for name, data in results.items()],
+        "seeds_needed": [ranking.needed_table(data, name) for name, data in results.items()],
+    }
+    for name, parts in tables.items():
+        written.files.append(out / f"{name}.csv")
+        pd.concat(parts).to_csv(written.files[-1], index=False, float_format="%.6g")
+
+
+def judgements_of(results: dict[str, xr.Dataset]) -> list[Judgement]:
+    """The judgements of all claims that rest on figures that were made."""
+    return [judgement for judgement in claims_of(results) if judgement.n_seeds]
+
+
+def _write_verdicts(results: dict[str, xr.Dataset], size: Size, out: Path, written: _Written) -> None:
+    judgements = judgements_of(results)
+    optima = [row for name, data in results.items() for row in report.optimum_rows(name, data)]
+    diverged = [row for name, data in results.items() for row in divergence.rows(name, data)]
+    page = report.render(size, written.pictures, judgements, optima, diverged, written.manifests)
+    claims = json.dumps(as_json(judgements), indent=2, allow_nan=False) + "\n"
+    for name, text in {"claims.json": claims, "report.html": page}.items():
+        (out / name).write_text(text, encoding="utf-8")
+        written.files.append(out / name)

@@ -1,0 +1,109 @@
+"""Publishes results: copies what a run wrote to `published/`, and renews the texts that quote it.
+
+    python -m paper_figs.publish --figures out --robustness OUT/robustness/summary
+
+Without options the texts alone are renewed.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+from paper_figs.figures import FIGURES
+from paper_figs.numbers import numbers_of
+from paper_figs.pipeline import results_folder
+from paper_figs.readme import renewed
+from sweeps.options import FLAGS, Folder
+from sweeps.results import store
+from sweeps.sweep import Size
+
+ROOT = Path(__file__).parents[1]
+TABLES = ("claims.json", "regret.csv", "seeds_needed.csv")
+_TEXTS = ("*.md", "paper_figs/*.md", "docs/**/*.md")
+
+
+@dataclass(frozen=True)
+class Options:
+    """Copies results to published/ and renews the texts that quote them."""
+
+    figures: Folder = None
+    """Folder that `make figures` wrote, with all figures at the paper's size."""
+    robustness: Folder = None
+    """Folder with the summary of a robustness study."""
+    root: Folder = ROOT
+    """Folder of the project."""
+
+
+def texts(root: Path) -> list[Path]:
+    """The project's texts that may quote results."""
+    return sorted({path for pattern in _TEXTS for path in root.glob(pattern)})
+
+
+def publish_figures(out: Path, target: Path) -> list[Path]:
+    """Copies figures, tables, verdicts and manifests, and writes the numbers that texts quote.
+
+    Args:
+      out: what `make figures` wrote.
+      target: folder of published figures.
+
+    Returns:
+      The files in `target`.
+
+    Raises:
+      OSError: if something is missing.
+    """
+    target.mkdir(parents=True, exist_ok=True)
+    folder = results_folder(out, Size())
+    copies = [out / name for name in TABLES]
+    copies += [out / f"{figure.name}{suffix}" for figure in FIGURES for suffix in (".pdf", ".png", ".csv")]
+    written = [Path(shutil.copyfile(path, target / path.name)) for path in copies]
+    for name in (*(figure.name for figure in FIGURES), "source"):
+        manifest = folder / name / store.MANIFEST
+        written.append(Path(shutil.copyfile(manifest, target / f"{name}.manifest.json")))
+    n_seeds = json.loads((out / "claims.json").read_text(encoding="utf-8"))[0]["n_seeds"]
+    results = {figure.name: store.load(folder / figure.name, n_seeds) for figure in FIGURES}
+    numbers = target / "numbers.json"
+    numbers.write_text(json.dumps(numbers_of(results), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    return [*written, numbers]
+
+
+def renew_texts(root: Path) -> list[Path]:
+    """Makes the marked parts of all texts anew; returns the texts that changed."""
+    changed = []
+    for path in texts(root):
+        before = path.read_text(encoding="utf-8")
+        after = renewed(before, root / "published")
+        if after != before:
+            path.write_text(after, encoding="utf-8")
+            changed.append(path)
+    return changed
+
+
+def main(args: list[str] | None = None) -> int:
+    """Entry point; returns the exit status."""
+    options = tyro.cli(Options, prog="python -m paper_figs.publish", args=args, config=FLAGS)
+    root = options.root or ROOT
+    written = []
+    try:
+        if options.figures:
+            written += publish_figures(options.figures, root / "published" / "figures")
+        if options.robustness:
+            target = root / "published" / "robustness"
+            shutil.copytree(options.robustness, target, dirs_exist_ok=True)
+            written.append(target)
+        written += renew_texts(root)
+    except (ValueError, OSError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    print("\n".join(map(str, written)))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

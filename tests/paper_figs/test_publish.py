@@ -1,0 +1,74 @@
+"""Texts say what the published results say, and one command renews both."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+import worlds
+
+from paper_figs import pipeline, publish, readme
+from paper_figs.claims.judge import as_json
+from paper_figs.claims.table import CLAIMS, claims_of
+from paper_figs.numbers import numbers_of
+
+PUBLISHED = publish.ROOT / "published"
+QUOTING = [path for path in publish.texts(publish.ROOT) if "made by python -m paper_figs.publish" in path.read_text()]
+
+
+@pytest.mark.parametrize("path", QUOTING, ids=lambda path: path.relative_to(publish.ROOT).as_posix())
+def test_texts_and_published_results_agree(path):
+    text = path.read_text()
+    assert readme.renewed(text, PUBLISHED) == text
+
+
+def test_every_claim_is_in_a_table_and_the_first_page_has_its_table():
+    texts = [path.read_text() for path in QUOTING]
+    for claim in CLAIMS:
+        assert any(f"| {claim.claim} | {claim.statement} | " in text for text in texts)
+    assert "made by python -m paper_figs.publish: verdicts" in (publish.ROOT / "README.md").read_text()
+
+
+def test_a_changed_result_changes_the_text_and_only_between_the_marks(tmp_path):
+    shutil.copytree(PUBLISHED, tmp_path / "published")
+    claims = tmp_path / "published" / "figures" / "claims.json"
+    claims.write_text(claims.read_text().replace('"contradicted"', '"supported"'))
+    before = (
+        "before <b>\n<!-- made by python -m paper_figs.publish: verdicts -->\nold\n<!-- end of verdicts -->\nafter\n"
+    )
+    (tmp_path / "README.md").write_text(before)
+    assert publish.renew_texts(tmp_path) == [tmp_path / "README.md"]
+    after = (tmp_path / "README.md").read_text()
+    assert after.startswith("before <b>\n<!-- made by")
+    assert after.endswith("<!-- end of verdicts -->\nafter\n")
+    assert "contradicted" not in after
+    assert "old" not in after
+    assert publish.renew_texts(tmp_path) == []
+
+
+def test_an_unknown_block_is_refused():
+    text = "<!-- made by python -m paper_figs.publish: nothing -->\n<!-- end of nothing -->"
+    with pytest.raises(ValueError, match=r"block: 'nothing'; allowed: headline, verdicts"):
+        readme.renewed(text, PUBLISHED)
+
+
+def test_missing_results_are_an_error_that_names_them(tmp_path, capsys):
+    assert publish.main(["--figures", str(tmp_path), "--root", str(tmp_path)]) == 2
+    assert "claims.json" in capsys.readouterr().err
+
+
+def test_quoted_numbers_are_those_of_the_results():
+    data = worlds.as_the_paper_says(seeds=5, episodes=450)
+    numbers = numbers_of(data)
+    assert set(numbers) == {"fig5a", "fig5b"}
+    np.testing.assert_allclose(numbers["fig5a"]["late_gap_q_learning"], 0.3, atol=1e-3)
+    np.testing.assert_allclose(numbers["fig5b"]["first_gap_dpr"], 0.5, atol=1e-3)
+    assert numbers["fig5a"]["c1_at_0.05"] == "supported"
+    json.dumps(numbers, allow_nan=False)
+
+
+def test_figures_that_were_not_made_have_no_verdicts_in_the_file():
+    data = worlds.as_the_paper_says(seeds=5, episodes=450)
+    found = pipeline.judgements_of({"fig9": data["fig9"]})
+    assert {j.figure for j in found} == {"9"}
+    assert len(as_json(found)) < len(claims_of({"fig9": data["fig9"]}))
