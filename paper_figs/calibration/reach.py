@@ -37,6 +37,7 @@ _COUNT = "a count has few outcomes; the next narrower interval would be wrong to
 _HEAVY = "Student's t is too wide for a few values with heavy tails"
 
 BEYOND: tuple[Beyond, ...] = (
+    Beyond("", "", tuple(n for n in SEEDS if n < FEWEST), "verdicts", "so few seeds give estimates and no verdicts"),
     Beyond("mean", "exponential", (5,), "errors", _TAIL),
     Beyond("mean", "lognormal", (5, 10, 30, 100), "errors", _TAIL),
     Beyond("mean", "one run in ten is a catastrophe", (5, 10, 30), "errors", _RARE),
@@ -53,7 +54,6 @@ BEYOND: tuple[Beyond, ...] = (
     Beyond("share of runs", "nine in ten", (5, 10), "coverage", _COUNT),
     Beyond("share of runs", "nine in ten", (30,), "errors", "a count's errors are 2.5 % on average over shares only"),
     Beyond("inter-quartile mean", "exponential", (5,), "errors", _TAIL),
-    Beyond("", "", tuple(n for n in SEEDS if n < FEWEST), "verdicts", "so few seeds give estimates and no verdicts"),
 )
 
 

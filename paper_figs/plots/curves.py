@@ -18,7 +18,7 @@ COLUMNS = ["figure", "panel", "algorithm", "x", "mean", "ci_low", "ci_high", "n_
 def table(data: xr.Dataset, figure: str, panel: str, points: dict[str, int] | None = None) -> pd.DataFrame:
     """The plotted numbers: mean reward per slot in bins of consecutive episodes, over seeds; and three exact lines.
 
-    `x` is the last episode of a bin. The interval is Student's t at 95 % over seeds. The exact lines have no seeds
+    `x` is the last episode of a bin. The interval is at 95 % over seeds (`mean_effect`). The exact lines have no seeds
     (n_seeds 0) and their interval is themselves. `n_diverged` of the seeds' agents diverged at some time.
 
     Args:

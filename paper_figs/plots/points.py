@@ -22,7 +22,7 @@ PANELS = {
 def table(data: xr.Dataset, figure: str, x_name: str, slots: int) -> pd.DataFrame:
     """The plotted numbers: means over all episodes, exploration included, and over seeds; and three exact lines.
 
-    The interval is Student's t at 95 % over seeds. The exact lines have no seeds (n_seeds 0) and their interval is
+    The interval is at 95 % over seeds (`mean_effect`). The exact lines have no seeds (n_seeds 0) and their interval is
     themselves. `n_diverged` of the seeds' agents diverged at some time.
 
     Args:

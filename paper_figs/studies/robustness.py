@@ -12,12 +12,12 @@ import pandas as pd
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from scipy import stats
 
 from paper_figs.analysis import divergence, ranking, regret
 from paper_figs.analysis.convergence import TOLERANCE, episodes_before, gaps, sample_complexity
+from paper_figs.analysis.intervals import interquartile_mean, probability_of_improvement, proportion_effect
 from paper_figs.analysis.scores import mean_over_episodes
-from paper_figs.analysis.statistics import CONFIDENCE, mean_over_seeds, proportion
+from paper_figs.analysis.statistics import CONFIDENCE, mean_over_seeds
 from paper_figs.plots import style
 
 STUDY_SIZES = (1, 3, 5, 10, 30, 100)
@@ -47,27 +47,15 @@ SCORES: dict[str, Score] = {
 }
 
 
-def interquartile_mean(values: np.ndarray, axis: int = -1) -> np.ndarray:
-    """Mean of the middle half."""
-    return stats.trim_mean(values, 0.25, axis=axis)
-
-
 def _distribution(values: np.ndarray) -> dict[str, float]:
     mean = mean_over_seeds(values)
     row = {"mean": mean.mean, "mean_low": mean.low, "mean_high": mean.high, "deviation": values.std()}
-    row["interquartile_mean"] = interquartile_mean(values)
-    if values.std() > 0:
-        generator = np.random.default_rng(0)
-        method, resamples = "percentile", 2000
-        interval = stats.bootstrap(
-            (values,),
-            interquartile_mean,
-            n_resamples=resamples,
-            confidence_level=CONFIDENCE,
-            method=method,
-            rng=generator,
-        ).confidence_interval
-        row |= {"interquartile_mean_low": interval.low, "interquartile_mean_high": interval.high}
+    middle = interquartile_mean(values)
+    row |= {
+        "interquartile_mean": middle.value,
+        "interquartile_mean_low": middle.low,
+        "interquartile_mean_high": middle.high,
+    }
     quantiles = np.quantile(values, (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0))
     names = ("minimum", "q05", "q25", "median", "q75", "q95", "maximum")
     return {name: float(v) for name, v in (row | dict(zip(names, quantiles, strict=True))).items()}
@@ -87,25 +75,16 @@ def distributions(data: xr.Dataset, environment: str) -> pd.DataFrame:
 def improvements(data: xr.Dataset, environment: str) -> pd.DataFrame:
     """Probability that a run of one learner is better than an independent run of another, ties counting half.
 
-    It is Mann and Whitney's statistic; its interval is a bootstrap over seeds.
+    Runs with the same seed are not compared.
     """
     rows = []
     for label, score in SCORES.items():
         of = {name: score.sign * score.of(data, name) for name in data["algorithm"].values}
         for a, b in itertools.combinations(of, 2):
-            value, low, high = improvement(of[a], of[b])
+            value, low, high = probability_of_improvement(of[a], of[b])
             rows.append((environment, label, a, b, value, low, high, len(of[a])))
     columns = ["environment", "score", "algorithm", "other", "probability", "low", "high", "n_seeds"]
     return pd.DataFrame(rows, columns=columns)
-
-
-def improvement(a: np.ndarray, b: np.ndarray, resamples: int = 1000, seed: int = 0) -> tuple[float, float, float]:
-    """P(a > b) + P(a = b) / 2 of independent runs [seeds] of each, with its 95 % bootstrap interval over seeds."""
-    wins = (np.sign(a[:, None] - b[None, :]) + 1) / 2
-    draws = np.random.default_rng(seed).multinomial(len(a), np.full(len(a), 1 / len(a)), size=resamples) / len(a)
-    scattered = np.einsum("ri,ij,rj->r", draws, wins, draws, optimize=True)
-    low, high = np.quantile(scattered, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2]) if len(a) > 1 else (np.nan, np.nan)
-    return float(wins.mean()), float(low), float(high)
 
 
 def misrankings(data: xr.Dataset, environment: str) -> pd.DataFrame:
@@ -126,8 +105,8 @@ def profiles(data: xr.Dataset, environment: str) -> pd.DataFrame:
     for name in data["algorithm"].values:
         late = SCORES["exact gap of the last 100 episodes"].of(data, name)
         grid = np.round(np.linspace(0.0, 0.3, 61), 3)
-        share = proportion((late[:, None] <= grid).sum(axis=0), len(late))
-        rows += [(environment, "gap", name, *row, len(late)) for row in zip(grid, *share[:3], strict=True)]
+        share = proportion_effect((late[:, None] <= grid).sum(axis=0), len(late))
+        rows += [(environment, "gap", name, *row, len(late)) for row in zip(grid, *share, strict=True)]
         sample = sample_complexity(data, name)
         steps = [*zip(sample.episodes, *sample.share, strict=True), (data.sizes["episode"], *sample.reached)]
         rows += [(environment, "converged", name, *row, len(late)) for row in steps]

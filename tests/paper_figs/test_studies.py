@@ -9,15 +9,14 @@ import pandas as pd
 import pytest
 import xarray as xr
 from rich.console import Console
-from scipy import stats
 from trees import by_name
 
 import jrcjax
 from jrcjax import exact
 from jrcjax.learners.hparams import HParams
-from paper_figs.analysis import ranking, statistics
+from paper_figs.analysis import ranking
 from paper_figs.claims.judge import Judgement, verdicts
-from paper_figs.studies import multiverse, robustness
+from paper_figs.studies import multiverse
 from sweeps.__main__ import main
 from sweeps.engine.program import points_of
 from sweeps.engine.run import run_sweep
@@ -35,14 +34,6 @@ from sweeps.studies.multiverse import (
     orthogonal_array,
 )
 from sweeps.studies.registry import STUDIES
-
-
-@pytest.mark.parametrize(("count", "n"), [(0, 10), (3, 10), (10, 10), (400, 1000)])
-def test_shares_have_wilsons_interval(count, n):
-    found = statistics.proportion(count, n)
-    wanted = stats.binomtest(count, n).proportion_ci(0.95, method="wilson")
-    np.testing.assert_allclose([found.mean, found.low, found.high], [count / n, wanted.low, wanted.high], atol=1e-12)
-
 
 # --- robustness -----------------------------------------------------------------------------------------------------
 
@@ -66,30 +57,6 @@ def test_seeds_needed_give_the_right_sign_with_95_percent():
     assert abs(right[1] - 0.95) < 0.01
     assert ranking.seeds_needed(np.ones(5)) == 1
     assert ranking.seeds_needed(np.array([1.0, -1.0])) == np.inf
-
-
-def test_improvement_is_mann_and_whitneys_probability():
-    rng = np.random.default_rng(3)
-    a, b = rng.normal(0.5, 1.0, 40), rng.normal(0.0, 1.0, 40)
-    value, low, high = robustness.improvement(a, b)
-    np.testing.assert_allclose(value, stats.mannwhitneyu(a, b).statistic / 40**2)
-    assert low < value < high
-    assert robustness.improvement(a, a)[0] == 0.5
-
-
-def test_the_interval_of_improvement_covers_the_truth():
-    rng, worlds = np.random.default_rng(4), 600
-    truth = stats.norm.cdf(0.5 / np.sqrt(2))
-    found = [robustness.improvement(rng.normal(0.5, 1, 50), rng.normal(0, 1, 50), 500) for _ in range(worlds)]
-    covered = np.mean([low <= truth <= high for _, low, high in found])
-    assert (
-        0.92 - 3 * np.sqrt(0.05 * 0.95 / worlds) < covered < 0.98
-    )  # 95 % less what 50 seeds cost a percentile interval
-
-
-def test_interquartile_means_ignore_the_tails():
-    values = np.array([-1e9, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 1e9])
-    assert robustness.interquartile_mean(values) == 3.5
 
 
 # --- multiverse -----------------------------------------------------------------------------------------------------
