@@ -12,6 +12,7 @@ from typing import Annotated
 
 import tyro
 
+from jrcjax.files import write_text
 from sweeps.options import FLAGS, File
 
 NAMES = ("throughput", "scaling", "limit", "canary", "start", "sum_tree", "paper")
@@ -50,7 +51,7 @@ def main(args: list[str] | None = None) -> int:
         results += module.run(options.quick)
     if options.json is not None:
         content = {"machine": machine() | {"versions": versions()}, "results": [asdict(result) for result in results]}
-        options.json.write_text(json.dumps(content, indent=2) + "\n")
+        write_text(options.json, json.dumps(content, indent=2) + "\n")
     return 0
 
 

@@ -18,7 +18,7 @@ from jrcjax.model.events import event_probability
 from jrcjax.model.params import EnvParams, of_params
 from jrcjax.model.rewards import reward
 from jrcjax.policies import greedy_policy
-from jrcjax.radar.modes import mean_miss_ratio
+from jrcjax.radar.bank import mean_miss_ratio
 from jrcjax.types import Float, Int
 
 __all__ = [

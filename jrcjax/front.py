@@ -20,7 +20,8 @@ from jrcjax.exact import miss_table, packet_table, policy_of_actions, stationary
 from jrcjax.model import metrics
 from jrcjax.model.events import event_probability
 from jrcjax.model.params import EnvParams, of_params
-from jrcjax.types import MISS_CONVENTIONS, Float
+from jrcjax.readings import MissConvention
+from jrcjax.types import Float
 
 
 class Boundary(NamedTuple):
@@ -50,7 +51,7 @@ def contributions(params: EnvParams) -> tuple[Float, Float]:
         counts = jnp.where(metrics.counts_for_miss(is_data, event, params.miss_convention), weight, 0.0)
         missed += counts * miss
         counted += counts[:, 0].sum()  # of data; the same for radar under all conventions but the last
-    has_trade_off = params.miss_convention != MISS_CONVENTIONS.index("radar_slots")
+    has_trade_off = params.miss_convention != MissConvention.RADAR_SLOTS
     return sent, jnp.where(has_trade_off, missed / counted, jnp.nan)
 
 

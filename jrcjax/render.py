@@ -21,11 +21,11 @@ from jrcjax.checks import require
 from jrcjax.model import slot, states
 from jrcjax.model.environment import EnvState
 from jrcjax.model.params import FACTORS, EnvParams
-from jrcjax.radar import chirp
+from jrcjax.radar.bank import slot_placement
 from jrcjax.radar.detection import merged_objects
-from jrcjax.radar.modes import slot_placement
 from jrcjax.radar.placement import Footprints
-from jrcjax.types import EVENT_MODELS, Float, Int, Key, Words
+from jrcjax.readings import EventModel
+from jrcjax.types import Int, Key, Words
 
 # Okabe and Ito's colours, which stay apart for the colour-blind; fill and outline say the same without colour.
 _RESOLVED: dict[str, Any] = {"facecolor": "#0072B2", "edgecolor": "#0072B2"}
@@ -95,7 +95,7 @@ def figure_of_words(words: Words | np.ndarray | None, state: int, action: int | 
 def scene_of(word: Words | np.ndarray, mode: int, params: EnvParams) -> Scene:
     """The placement that a slot with this word for its placement draws for a radar mode."""
     present, footprints, merged = _placed(jnp.asarray(word, jnp.uint32), mode, params.radar)
-    reach, resolution = _reaches(params)[mode], chirp.range_resolution(params.radar.bandwidth)[mode]
+    reach, resolution = params.radar.reach[mode], params.radar.resolution[mode]
     centre, size, merged = (np.asarray(a)[np.asarray(present)] for a in (footprints.centre, footprints.size, merged))
     return Scene(centre, size, merged, float(reach), float(resolution))
 
@@ -113,17 +113,12 @@ _run_slot = jax.jit(slot.run_slot)
 @jax.jit(static_argnums=1)
 def _placed(word: Words, mode: int, radar: Any) -> tuple[jax.Array, Footprints, jax.Array]:
     count, footprints = slot_placement(word, mode, radar)
-    resolution = chirp.range_resolution(radar.bandwidth)[mode]
     present = jnp.arange(footprints.present.shape[0]) < count
-    return present, footprints, merged_objects(footprints, resolution, radar.distance)
-
-
-def _reaches(params: EnvParams) -> Float:
-    return chirp.maximum_range(params.radar.slope, params.radar.max_intermediate_frequency)
+    return present, footprints, merged_objects(footprints, radar.resolution[mode], radar.distance)
 
 
 def _shortest(params: EnvParams) -> int:
-    return int(np.argmin(_reaches(params)))
+    return int(np.argmin(params.radar.reach))
 
 
 def _draw_map(axes: Axes, scene: Scene | None, radar_is_on: bool) -> None:
@@ -183,7 +178,7 @@ def _strip(axes: Axes, y: float, name: str, labels: list[str], chosen: int | Non
 def _told(outcome: slot.Outcome | None, scene: Scene | None, params: EnvParams) -> list[tuple[str, str]]:
     """Lines of text and their colours."""
     if outcome is None or scene is None:
-        return [(f"events: {EVENT_MODELS[int(params.event_model)]}", "0.35")]
+        return [(f"events: {EventModel.names()[int(params.event_model)]}", "0.35")]
     event = bool(outcome.event)
     seen = f"{scene.reach:.0f} m, resolution {scene.resolution:.2g} m"
     what = f"radar: {seen}" if not outcome.is_data else f"data: {float(outcome.packets):g} packets delivered"

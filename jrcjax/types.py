@@ -1,4 +1,4 @@
-"""Array aliases used in signatures, and the named choices of the model.
+"""Array aliases used in signatures.
 
 Shapes are given in docstrings with these letters: S states, A actions, L data
 rates, K radar modes, F factors, J levels of one factor, B a batch or a bank, N objects.
@@ -21,28 +21,11 @@ Bool: TypeAlias = jax.Array
 Words: TypeAlias = jax.Array
 """A uint32 array of random bits."""
 
-# Each tuple names the readings of one decision that the paper leaves open; its index is what the
-# parameters hold, so that a reading can be vmapped over. The first is the default.
-EVENT_MODELS = ("conditional", "marginal", "noisy_or")
-MISS_CONVENTIONS = ("all_slots", "event_slots", "radar_slots")
-DISTANCES = ("footprint_gap", "centre_to_centre", "radial_range")
-COUNTING_RULES = ("resolved", "clusters")
-COUNT_MODELS = ("fixed", "poisson")
-PLACEMENTS = ("bank", "fresh")
 INITIAL_WEIGHTS = ("random", "source")
-READINGS = {
-    "event_model": EVENT_MODELS,
-    "miss_convention": MISS_CONVENTIONS,
-    "distance": DISTANCES,
-    "counting_rule": COUNTING_RULES,
-    "count_model": COUNT_MODELS,
-    "initial_weights": INITIAL_WEIGHTS,
-}
-"""Field of the parameters to the names of its readings."""
 
 
 def choice(field: str, name: str, allowed: tuple[str, ...]) -> int:
-    """Index of the reading `name`.
+    """Number of `name` among the names that are allowed.
 
     Raises:
       ValueError: naming the field, the value and what is allowed.

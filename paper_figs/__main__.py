@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import tyro
-from rich.console import Console
 
 from sweeps import interrupts
+from sweeps.command import begin
 from sweeps.options import FLAGS, Count, Counts, Folder, Preset
 from sweeps.preset import preset_of
 from sweeps.sweep import size_of
@@ -37,17 +37,14 @@ class Options:
 def main(args: list[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     options = tyro.cli(Options, prog="python -m paper_figs", args=args, config=FLAGS)
-    from jrcjax.training import parallel  # after parsing, so that --help and errors come at once
-
-    parallel.use_all_cores()
-    parallel.keep_compiled()
     out = options.out or Path("out/smoke" if options.smoke else "out")
     try:
+        console = begin()
         size = size_of(options.seeds, options.episodes, preset_of(options.preset), options.smoke)
         with interrupts.terminable():
             from paper_figs.pipeline import make_figures
 
-            written = make_figures(options.only, size, out, Console(stderr=True))
+            written = make_figures(options.only, size, out, console)
     except KeyboardInterrupt:
         print(interrupts.how_to_go_on(), file=sys.stderr)
         return interrupts.STATUS

@@ -10,6 +10,7 @@ import pandas as pd
 import xarray as xr
 from rich.console import Console
 
+from jrcjax.files import write_text
 from paper_figs import report
 from paper_figs.analysis import divergence, ranking, regret
 from paper_figs.claims.judge import Judgement, as_json
@@ -69,7 +70,7 @@ def make_figures(numbers: tuple[int, ...], size: Size, out: Path, console: Conso
         found = run_sweep(SWEEPS[figure.name], size, folder, console, resume=True)
         results[figure.name] = store.load(found, size.seeds)
         _write_figure(figure, results[figure.name], slots, out, written)
-        written.manifests[figure.name] = (found / store.MANIFEST).read_text()
+        written.manifests[figure.name] = (found / store.MANIFEST).read_text(encoding="utf-8")
     _write_tables(results, slots, out, written)
     _write_verdicts(results, size, out, written)
     return written.files
@@ -77,8 +78,7 @@ def make_figures(numbers: tuple[int, ...], size: Size, out: Path, console: Conso
 
 def _write_figure(figure: PaperFigure, data: xr.Dataset, slots: int, out: Path, written: _Written) -> None:
     table = figure.table(data, slots)
-    path = out / f"{figure.name}.csv"
-    table.to_csv(path, index=False, float_format="%.6g")
+    path = style.save_table(table, out / f"{figure.name}.csv")
     files = style.save(figure.draw(table, figure.title), out / figure.name)
     written.files += [path, *files]
     written.pictures[figure.title] = files[-1]
@@ -90,8 +90,7 @@ def _write_tables(results: dict[str, xr.Dataset], slots: int, out: Path, written
         "seeds_needed": [ranking.needed_table(data, name) for name, data in results.items()],
     }
     for name, parts in tables.items():
-        written.files.append(out / f"{name}.csv")
-        pd.concat(parts).to_csv(written.files[-1], index=False, float_format="%.6g")
+        written.files.append(style.save_table(pd.concat(parts), out / f"{name}.csv"))
 
 
 def judgements_of(results: dict[str, xr.Dataset]) -> list[Judgement]:
@@ -106,5 +105,4 @@ def _write_verdicts(results: dict[str, xr.Dataset], size: Size, out: Path, writt
     page = report.render(size, written.pictures, judgements, optima, diverged, written.manifests)
     claims = json.dumps(as_json(judgements), indent=2, allow_nan=False) + "\n"
     for name, text in {"claims.json": claims, "report.html": page}.items():
-        (out / name).write_text(text, encoding="utf-8")
-        written.files.append(out / name)
+        written.files.append(write_text(out / name, text))

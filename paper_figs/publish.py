@@ -15,6 +15,7 @@ from pathlib import Path
 
 import tyro
 
+from jrcjax.files import write_text
 from paper_figs.figures import FIGURES
 from paper_figs.numbers import numbers_of
 from paper_figs.pipeline import results_folder
@@ -69,7 +70,7 @@ def publish_figures(out: Path, target: Path) -> list[Path]:
     n_seeds = json.loads((out / "claims.json").read_text(encoding="utf-8"))[0]["n_seeds"]
     results = {figure.name: store.load(folder / figure.name, n_seeds) for figure in FIGURES}
     numbers = target / "numbers.json"
-    numbers.write_text(json.dumps(numbers_of(results), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    write_text(numbers, json.dumps(numbers_of(results), indent=2, allow_nan=False) + "\n")
     return [*written, numbers]
 
 
@@ -80,7 +81,7 @@ def renew_texts(root: Path) -> list[Path]:
         before = path.read_text(encoding="utf-8")
         after = renewed(before, root / "published")
         if after != before:
-            path.write_text(after, encoding="utf-8")
+            write_text(path, after)
             changed.append(path)
     return changed
 

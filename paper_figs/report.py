@@ -9,14 +9,13 @@ import struct
 from pathlib import Path
 from typing import Any
 
-import jax
 import jinja2
 import numpy as np
 import xarray as xr
 
 from jrcjax.model.params import EnvParams
 from jrcjax.model.presets import ENVIRONMENTS, PRESETS
-from jrcjax.types import READINGS
+from jrcjax.named import field_at, named_inputs
 from paper_figs.claims import words
 from paper_figs.claims.judge import Judgement
 from paper_figs.claims.results import Rules
@@ -73,7 +72,7 @@ def render(
         "criterion": words.criterion,
         "interval": words.interval,
     }
-    return environment.from_string(_TEMPLATE.read_text()).render(
+    return environment.from_string(_TEMPLATE.read_text(encoding="utf-8")).render(
         size=size,
         preset=label_of(size.preset),
         file=None if size.preset in PRESETS else size.preset,
@@ -126,14 +125,10 @@ def _environments(preset: str) -> dict[str, list[str]]:
 
 
 def _numbers(params: EnvParams) -> dict[str, str]:
-    leaves = jax.tree_util.tree_leaves_with_path(params)
-    named = {jax.tree_util.keystr(path, simple=True, separator="."): np.asarray(leaf) for path, leaf in leaves}
     found = {}
-    for path, values in named.items():
-        readings = READINGS.get(path.split(".")[-1])
-        if "bank_inputs" in path or "miss_bank" in path:
-            continue
-        found[path] = readings[int(values)] if readings else _listed(values)
+    for path, values in named_inputs(params).items():
+        names = field_at(EnvParams, path).names
+        found[path] = names[int(values)] if names else _listed(np.asarray(values))
     return found | {"max_steps_in_episode": str(params.max_steps_in_episode)}
 
 
@@ -161,13 +156,24 @@ def _made(manifests: dict[str, dict]) -> list[dict[str, Any]]:
             "sweep": name,
             "seeds": len(m["seeds"]),
             "finished": m["finished"],
-            "command": m["command"],
-            "commit": (m["git_commit"] or "not in git")[:12] + (" with changes" if m["git_modified"] else ""),
-            "machine": ", ".join(_in_words(key, value) for key, value in m["machine"].items()),
-            "versions": ", ".join(f"{package} {version}" for package, version in m["versions"].items()),
+            "command": "; ".join(_each(m["command"])),
+            "commit": ", ".join((commit or "not in git")[:12] for commit in _each(m["git_commit"]))
+            + (" with changes" if any(_each(m["git_modified"])) else ""),
+            "machine": "; ".join(
+                ", ".join(_in_words(key, value) for key, value in machine.items()) for machine in _each(m["machine"])
+            ),
+            "versions": "; ".join(
+                ", ".join(f"{package} {version}" for package, version in versions.items())
+                for versions in _each(m["versions"])
+            ),
         }
         for name, m in manifests.items()
     ]
+
+
+def _each(value: Any) -> list[Any]:
+    """The values of a manifest's field: several where the parts of a sweep come from several places."""
+    return value if isinstance(value, list) else [value]
 
 
 def _in_words(key: str, value: Any) -> str:

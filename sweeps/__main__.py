@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Annotated
 
 import tyro
-from rich.console import Console
 
 from jrcjax.checks import refuse
 from sweeps import interrupts
+from sweeps.command import begin
 from sweeps.options import FLAGS, Count, Preset
 from sweeps.preset import preset_of
 from sweeps.studies.custom import CUSTOM, Custom, Options, custom_sweep
@@ -72,45 +72,47 @@ Command = (
 def main(args: list[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     command = tyro.cli(Command, prog="python -m sweeps", args=args, description=__doc__, config=FLAGS)
-    from jrcjax.training import parallel  # after parsing, so that --help and errors come at once
-    from jrcjax.types import choice
-    from paper_figs.studies import custom
-
-    parallel.use_all_cores()
-    parallel.keep_compiled()
-    from paper_figs.studies.summaries import SUMMARIES
-    from sweeps.engine.run import run_sweep
-    from sweeps.studies.registry import EVERY_SWEEP, STUDIES
-
-    console = Console(stderr=True)
-    if isinstance(command, List):
-        for study in STUDIES.values():
-            print(f"{study.name:12s} {study.description}")
-        print(f"{CUSTOM:12s} one of your own: run custom --vary PATH=VALUES")
-        return 0
     try:
-        if isinstance(command, Verify):
-            return _verify(command)
-        choice("name", command.name, (*STUDIES, CUSTOM))
-        preset = preset_of(command.preset)
-        own = _own(command, preset, (*STUDIES, *EVERY_SWEEP))
-        study = Study(CUSTOM, "", (own.sweep,)) if own else STUDIES[command.name]
-        size = size_of(command.seeds, command.episodes, preset, command.smoke, study)
-        size.check()
-        sweeps = study.smoke_sweeps if command.smoke and study.smoke_sweeps else study.sweeps
-        options = {"resume": command.resume, "save_agents": command.save_agents}
-        with interrupts.terminable(), _client(command) as client:
-            written = [run_sweep(sweep, size, command.out, console, **options, client=client) for sweep in sweeps]
-            if own:
-                written += custom.write(written[0], own, size.seeds)
-            if study.name in SUMMARIES:
-                written += SUMMARIES[study.name](sweeps, size, command.out)
+        return _run(command)
     except KeyboardInterrupt:
         print(interrupts.how_to_go_on("--resume"), file=sys.stderr)
         return interrupts.STATUS
     except (ValueError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
+
+
+def _run(command: Command) -> int:
+    """Does what the command says; returns the exit status."""
+    from sweeps.studies.registry import EVERY_SWEEP, STUDIES  # after parsing, so that --help and errors come at once
+
+    if isinstance(command, List):
+        for study in STUDIES.values():
+            print(f"{study.name:12s} {study.description}")
+        print(f"{CUSTOM:12s} one of your own: run custom --vary PATH=VALUES")
+        return 0
+    console = begin()
+    from jrcjax.types import choice
+    from paper_figs.studies import custom
+    from paper_figs.studies.summaries import SUMMARIES
+    from sweeps.engine.run import run_sweep
+
+    if isinstance(command, Verify):
+        return _verify(command)
+    choice("name", command.name, (*STUDIES, CUSTOM))
+    preset = preset_of(command.preset)
+    own = _own(command, preset, (*STUDIES, *EVERY_SWEEP))
+    study = Study(CUSTOM, "", (own.sweep,)) if own else STUDIES[command.name]
+    size = size_of(command.seeds, command.episodes, preset, command.smoke, study)
+    size.check()
+    sweeps = study.smoke_sweeps if command.smoke and study.smoke_sweeps else study.sweeps
+    options = {"resume": command.resume, "save_agents": command.save_agents}
+    with interrupts.terminable(), _client(command) as client:
+        written = [run_sweep(sweep, size, command.out, console, **options, client=client) for sweep in sweeps]
+        if own:
+            written += custom.write(written[0], own, size.seeds)
+        if study.name in SUMMARIES:
+            written += SUMMARIES[study.name](sweeps, size, command.out)
     print("\n".join(map(str, written)))
     return 0
 

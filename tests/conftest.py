@@ -4,14 +4,13 @@ Two CPU devices, so that what is sharded over devices is sharded in the tests, t
 """
 
 import jax
-import jax.numpy as jnp
 import numpy_model
 import pytest
 
 import jrcjax
 from jrcjax.model.channel import Channel
-from jrcjax.model.params import EnvParams, make_factor
-from jrcjax.radar.modes import make_radar
+from jrcjax.model.params import EnvParams, Factor
+from jrcjax.radar.bank import make_radar
 from jrcjax.training import parallel
 
 jax.config.update("jax_num_cpu_devices", 2)  # nothing above makes an array
@@ -24,11 +23,9 @@ RANDOM_SEEDS = (0, 1, 2)
 def random_params(seed: int) -> EnvParams:
     """A valid environment with 2 or 3 levels per factor, 3 rates and 3 radar modes; persistence from seed 1 on."""
     described = numpy_model.random_description(seed)
-    as_float = lambda value: jnp.asarray(value, jnp.float32)  # noqa: E731
-    channel = described["channel"]
-    factors = {name: make_factor(**described[name]) for name in ("road", "weather", "speed", "nearby")}
+    factors = {name: Factor(**described[name]) for name in ("road", "weather", "speed", "nearby")}
     return EnvParams(
-        channel=Channel(**{name: as_float(value) for name, value in channel.items()}),
+        channel=Channel(**described["channel"]),
         **factors,
         radar=make_radar(
             bandwidth=(3e8, 5e8, 7.5e8),
@@ -40,11 +37,8 @@ def random_params(seed: int) -> EnvParams:
             size_std=((0.2, 0.1), (0.1, 0.1), (1.0, 0.2)),
             bank_size=512,
         ),
-        reward_weights=as_float(described["reward_weights"]),
-        event_model=jnp.int32(described["event_model"]),
-        miss_convention=jnp.int32(0),
-        count_event_packets=jnp.int32(1),
-        terminal_time_limit=jnp.int32(0),
+        reward_weights=described["reward_weights"],
+        event_model=described["event_model"],
     )
 
 

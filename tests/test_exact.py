@@ -9,7 +9,7 @@ from significance import ALPHA, mean_differs
 
 from jrcjax import exact
 from jrcjax.model import metrics, slot
-from jrcjax.types import EVENT_MODELS, MISS_CONVENTIONS
+from jrcjax.readings import EventModel, MissConvention
 
 EPS = float(np.finfo(np.float32).eps)
 TOLERANCE = 1e-4  # of value_iteration, by default
@@ -56,9 +56,9 @@ def test_stationary_distribution(any_params):
     np.testing.assert_allclose(law, stationary(tensor[:, 0]), rtol=1e-4, atol=EPS)
 
 
-@pytest.mark.parametrize("reading", EVENT_MODELS)
+@pytest.mark.parametrize("reading", EventModel)
 def test_expected_reward(any_params, reading):
-    params = any_params.replace(event_model=jnp.int32(EVENT_MODELS.index(reading)))
+    params = any_params.replace(event_model=reading)
     expected = Model(params).expected_reward()
     # Sums of numbers up to the largest weight, which may cancel.
     largest = float(np.max(params.reward_weights))
@@ -102,10 +102,10 @@ def test_larger_gamma_needs_the_transitions(environments):
 
 
 @pytest.mark.parametrize("count_event_packets", [0, 1])
-@pytest.mark.parametrize("convention", MISS_CONVENTIONS)
+@pytest.mark.parametrize("convention", MissConvention)
 def test_evaluate_policy(any_params, convention, count_event_packets):
     params = any_params.replace(
-        miss_convention=jnp.int32(MISS_CONVENTIONS.index(convention)),
+        miss_convention=convention,
         count_event_packets=jnp.int32(count_event_packets),
     )
     for seed in range(3):
@@ -154,9 +154,9 @@ def test_evaluate_policy_against_a_million_slots(environments, name):
         assert mean_differs(sums.reward / SLOTS, float(expected.reward) + 0.5) < ALPHA  # it can tell
 
 
-@pytest.mark.parametrize("convention", MISS_CONVENTIONS)
+@pytest.mark.parametrize("convention", MissConvention)
 def test_miss_detection_of_a_policy_that_only_transmits(target, convention):
-    params = target.replace(miss_convention=jnp.int32(MISS_CONVENTIONS.index(convention)))
+    params = target.replace(miss_convention=convention)
     run = exact.evaluate_policy(params, exact.policy_of_actions(jnp.zeros(32, jnp.int32), 4))
     assert float(run.throughput) == pytest.approx(2.0, rel=10 * EPS)
     if convention == "radar_slots":

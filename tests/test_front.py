@@ -10,7 +10,7 @@ from scipy.optimize import linprog
 from tiny import tiny_params
 
 from jrcjax import exact, front
-from jrcjax.types import MISS_CONVENTIONS
+from jrcjax.readings import MissConvention
 
 EPS = np.finfo(np.float32).eps
 ATOL = float(100 * EPS)  # sums of some ten numbers up to 4
@@ -108,7 +108,7 @@ def test_over_an_axis_of_environments(target):
 
 
 def test_a_convention_without_a_trade_off(target):
-    params = target.replace(miss_convention=jnp.int32(MISS_CONVENTIONS.index("radar_slots")))
+    params = target.replace(miss_convention=MissConvention.RADAR_SLOTS)
     assert np.isnan(front.front(params).miss_detection).all()
 
 

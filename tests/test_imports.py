@@ -10,7 +10,19 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 FLOORS = (
-    ("types", "checks", "files", "machine", "rng", "policies", "provenance"),
+    (
+        "types",
+        "checks",
+        "readings",
+        "containers",
+        "named",
+        "files",
+        "machine",
+        "numerics",
+        "rng",
+        "policies",
+        "provenance",
+    ),
     ("radar",),
     ("model", "events"),
     ("exact", "render"),

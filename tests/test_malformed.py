@@ -35,7 +35,7 @@ def leaves_of(params, prefix=""):
         value, name = getattr(params, field.name), f"{prefix}{field.name}"
         if dataclasses.is_dataclass(value):
             yield from leaves_of(value, f"{name}.")
-        elif hasattr(value, "shape"):
+        elif hasattr(value, "shape") and field.init:
             yield name
 
 
@@ -67,12 +67,12 @@ class Malformed:
 
     def environment_field(self):
         field = self.pick(*self.fields)
-        bad = put(self.target, field, self.pick(*BAD_NUMBERS))
-        return lambda: jrcjax.check_params(bad), "; allowed: "
+        value = self.pick(*BAD_NUMBERS)
+        return lambda: jrcjax.check_params(put(self.target, field, value)), "; allowed: "
 
     def environment_shape(self):
-        bad = put(self.target, self.pick(*self.fields), np.zeros(self.random.choices(range(4), k=4)))
-        return lambda: jrcjax.check_params(bad), "; allowed: "
+        field, value = self.pick(*self.fields), np.zeros(self.random.choices(range(4), k=4))
+        return lambda: jrcjax.check_params(put(self.target, field, value)), "; allowed: "
 
     def slots(self):
         bad = dataclasses.replace(self.target, max_steps_in_episode=self.pick(*NO_SIZES))

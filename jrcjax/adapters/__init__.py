@@ -16,16 +16,22 @@ import importlib
 import importlib.util
 from typing import TYPE_CHECKING, Any
 
-from jrcjax.model.presets import ENVIRONMENTS
-
 if TYPE_CHECKING:
     from jrcjax.adapters.five_tuple import FiveTupleEnv
     from jrcjax.adapters.gymnasium_env import GymnasiumEnv
     from jrcjax.adapters.gymnax_env import GymnaxEnv
+    from jrcjax.adapters.sb3_vec_env import SB3VecEnv
+    from jrcjax.adapters.vector_env import VectorEnv
 
-__all__ = ["FiveTupleEnv", "GymnasiumEnv", "GymnaxEnv"]
+__all__ = ["FiveTupleEnv", "GymnasiumEnv", "GymnaxEnv", "SB3VecEnv", "VectorEnv"]
 
-_MODULES = {"FiveTupleEnv": "five_tuple", "GymnasiumEnv": "gymnasium_env", "GymnaxEnv": "gymnax_env"}
+_MODULES = {
+    "FiveTupleEnv": "five_tuple",
+    "GymnasiumEnv": "gymnasium_env",
+    "GymnaxEnv": "gymnax_env",
+    "SB3VecEnv": "sb3_vec_env",
+    "VectorEnv": "vector_env",
+}
 
 
 def __getattr__(name: str) -> Any:
@@ -35,16 +41,7 @@ def __getattr__(name: str) -> Any:
     return getattr(importlib.import_module(f"{__name__}.{_MODULES[name]}"), name)
 
 
-def _register() -> None:
-    from gymnasium.envs.registration import register  # pyright: ignore[reportMissingImports]
-
-    for environment in ENVIRONMENTS:
-        register(
-            f"jrcjax/JRC-{environment}-v0",
-            entry_point=f"{__name__}.gymnasium_env:paper_env",
-            kwargs={"environment": environment},
-        )
-
-
 if importlib.util.find_spec("gymnasium"):
-    _register()
+    from jrcjax.adapters.registration import register_all
+
+    register_all()

@@ -13,7 +13,8 @@ from jrcjax.types import Bool, Float, Int, Key
 class FiveTupleEnv(GymnaxEnv):
     """`GymnaxEnv` whose `step` returns (obs, state, reward, done, info), as gymnax did before version 1.0.
 
-    `done` is true after the last slot of an episode, whether it terminated or was cut off; `info` tells which.
+    `done` is true after the last slot of an episode, whether it terminated or was cut off; `info` tells which. With
+    gymnax 1.0 or later, `gymnax.wrappers.compat.LegacyStepAPIWrapper(GymnaxEnv())` does the same.
     """
 
     def step(  # pyright: ignore[reportIncompatibleMethodOverride]

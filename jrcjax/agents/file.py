@@ -25,18 +25,16 @@ from jrcjax.learners import LEARNERS, Spec
 from jrcjax.learners.hparams import Config, HParams
 from jrcjax.learners.q_function import q_function
 from jrcjax.model import states
-from jrcjax.model.channel import Channel
-from jrcjax.model.params import FACTORS, EnvParams, Factor
+from jrcjax.model.params import EnvParams
+from jrcjax.named import container_of, named_arrays, named_settings
 from jrcjax.provenance import provenance
-from jrcjax.radar.modes import Radar
 from jrcjax.training.rollout import AgentState, spec_of
 from jrcjax.types import Key, choice
 
-VERSION = 1
+VERSION = 2
 """Of the files' layout."""
 ABOUT = "jrcjax agents"
 """Key of the metadata under which a file says what it holds."""
-_CONTAINERS = dict.fromkeys(FACTORS, Factor) | {"channel": Channel, "radar": Radar}  # an environment's parts
 _OPTAX = "optax"  # an optimiser that had no name
 LEARNING = tuple(name for name in LEARNERS if name != "round_robin")
 """Learners that have something to save."""
@@ -95,13 +93,13 @@ def save_agents(
       ValueError: naming the argument, the value and what is allowed, before the file is touched.
     """
     config = Config() if config is None else config
-    tensors = {f"params.{name}": leaf for name, leaf in _named(env_params).items()}
-    tensors |= {f"hparams.{name}": leaf for name, leaf in _named(hparams).items()}
+    tensors = {f"params.{name}": leaf for name, leaf in named_arrays(env_params).items()}
+    tensors |= {f"hparams.{name}": leaf for name, leaf in named_arrays(hparams).items()}
     points = hparams.discount.shape[0]
     for learner, agent in agents.items():
         choice("learner", learner, LEARNING)
         _check_values(learner, agent.learner, spec_of(env_params), config, (points, len(seeds)))
-        named = _named(agent.learner) | {"key": jax.random.key_data(_typed(agent.key))}
+        named = named_arrays(agent.learner) | {"key": jax.random.key_data(_typed(agent.key))}
         tensors |= {f"agents.{learner}.{name}": leaf for name, leaf in named.items()}
     about = {
         "version": VERSION,
@@ -109,9 +107,7 @@ def save_agents(
         "points": points,
         "seeds": [int(seed) for seed in seeds],
         "config": _plain_config(config),
-        "max_steps_in_episode": env_params.max_steps_in_episode,
-        "max_objects": env_params.radar.max_objects,
-        "placements": env_params.radar.placements,
+        "settings": named_settings(env_params),
         "key_implementation": str(jax.random.key_impl(_typed(next(iter(agents.values())).key))),
         "provenance": provenance(),
     }
@@ -137,13 +133,14 @@ def load_agent(
         name = _chosen("learner", learner, about["learners"])
         x = _chosen("point", point, list(range(about["points"])))
         number = _chosen("seed", seed, about["seeds"])
-        params, hparams = (_unnamed(_read(file, prefix, (x,))) for prefix in ("params.", "hparams."))
+        params, hparams = (_read(file, prefix, (x,)) for prefix in ("params.", "hparams."))
         agent = _unnamed(_read(file, f"agents.{name}.", (x, about["seeds"].index(number))))
     key = jax.random.wrap_key_data(agent.pop("key"), impl=about["key_implementation"])
     config = Config(**about["config"] | {"hidden": tuple(about["config"]["hidden"])})
-    environment = _environment(params, about)
+    environment = _environment(params, about["settings"])
     _check_values(name, agent, spec_of(environment), config, ())
-    return SavedAgent(name, environment, HParams(**hparams), config, key, agent, x, number, about["provenance"])
+    learned_with = HParams(**{field: jnp.asarray(leaf) for field, leaf in hparams.items()})
+    return SavedAgent(name, environment, learned_with, config, key, agent, x, number, about["provenance"])
 
 
 def acting_part(learner_state: Any) -> dict[str, Any]:
@@ -167,18 +164,12 @@ def _check_values(learner: str, values: dict[str, Any], spec: Spec, config: Conf
         wanted: Any = {"q": jax.ShapeDtypeStruct((states.num_states(spec.shape), spec.num_actions), jnp.float32)}
     else:
         wanted = {"weights": jax.eval_shape(q_function(spec, config).init, jax.random.key(0))}
-    shapes = {name: (*leading, *leaf.shape) for name, leaf in _named(wanted).items()}
-    found = {name: tuple(leaf.shape) for name, leaf in _named(values).items()}
+    shapes = {name: (*leading, *leaf.shape) for name, leaf in named_arrays(wanted).items()}
+    found = {name: tuple(leaf.shape) for name, leaf in named_arrays(values).items()}
     if found != shapes:
         refuse(
             f"agents.{learner}", f"shapes {found}", f"{shapes}, as levels {spec.shape} and the configuration have it"
         )
-
-
-def _named(tree: Any) -> dict[str, Any]:
-    """Leaves by their dotted path."""
-    leaves = jax.tree_util.tree_leaves_with_path(tree)
-    return {jax.tree_util.keystr(path, simple=True, separator="."): leaf for path, leaf in leaves}
 
 
 def _unnamed(leaves: dict[str, np.ndarray]) -> dict[str, Any]:
@@ -193,11 +184,10 @@ def _unnamed(leaves: dict[str, np.ndarray]) -> dict[str, Any]:
     return tree
 
 
-def _environment(parts: dict[str, Any], about: dict[str, Any]) -> EnvParams:
-    """Environment parameters from their leaves and what is static of them."""
-    statics = {"radar": {"max_objects": tuple(about["max_objects"]), "placements": about["placements"]}}
-    built: dict[str, Any] = {name: kind(**parts[name], **statics.get(name, {})) for name, kind in _CONTAINERS.items()}
-    return EnvParams(**parts | built, max_steps_in_episode=about["max_steps_in_episode"])
+def _environment(arrays: dict[str, np.ndarray], settings: dict[str, Any]) -> EnvParams:
+    """Environment parameters from their leaves and what is static of them, which JSON gives as lists."""
+    statics = {name: tuple(value) if isinstance(value, list) else value for name, value in settings.items()}
+    return container_of(EnvParams, {name: jnp.asarray(leaf) for name, leaf in arrays.items()}, statics)
 
 
 def _read(file: Any, prefix: str, place: tuple[int, ...]) -> dict[str, np.ndarray]:

@@ -23,7 +23,8 @@ from typing import Any, NamedTuple
 import tyro
 
 from jrcjax.checks import refuse
-from jrcjax.radar.bank import REFERENCE_SIDE
+from jrcjax.files import write_text
+from jrcjax.radar.modes import REFERENCE_SIDE
 from jrcjax.types import choice
 
 CLASSES = {
@@ -255,7 +256,7 @@ def main(args: list[str] | None = None) -> int:
         if given.out is None:
             print(text, end="")
         else:
-            given.out.write_text(text, encoding="utf-8")
+            write_text(given.out, text)
             print(given.out)
     except ModuleNotFoundError as error:
         print(f"error: {error}; install jrcjax[nuscenes]", file=sys.stderr)

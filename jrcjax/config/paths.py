@@ -15,9 +15,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from jrcjax.checks import refuse
+from jrcjax.containers import Container, Kind, schema_of
 from jrcjax.learners.hparams import HParams
 from jrcjax.model.params import FACTORS, EnvParams
-from jrcjax.types import READINGS
+from jrcjax.named import field_at
+from jrcjax.types import INITIAL_WEIGHTS
 
 
 class Points(NamedTuple):
@@ -28,7 +30,7 @@ class Points(NamedTuple):
 
 
 _ROOTS = {"env": "params", "hparams": "hparams"}
-_DERIVED = ("miss_bank", "bank_inputs")  # follow from a radar's other fields
+_READINGS = {"initial_weights": INITIAL_WEIGHTS}
 _DISTRIBUTIONS = ("prior", "class_share")
 _LOW_AND_HIGH = ("prior", "event_probability", "interference", "packets", "sinr_threshold")
 _MOST_VALUES = 1000
@@ -124,7 +126,7 @@ def parameter_at(path: str, point: Points) -> Parameter:
     entries = tuple(_entry(path, start, container) for start in starts)
     leaf = _leaf(container, entries[0])
     is_whole = jnp.issubdtype(leaf.dtype, jnp.integer)
-    return Parameter(path, _ROOTS[root], entries, READINGS.get(entries[0].fields[-1], ()), is_whole)
+    return Parameter(path, _ROOTS[root], entries, _readings_of(container, entries[0].fields), is_whole)
 
 
 def _leaf(container: Any, entry: Entry) -> jax.Array:
@@ -153,17 +155,30 @@ def _entry(path: str, parts: list[str], container: Any) -> Entry:
 
 def _fields_of(container: Any) -> list[str]:
     """The fields that may differ between the points of one program."""
-    fields = [f.name for f in dataclasses.fields(container) if f.metadata.get("pytree_node", True)]
-    return [name for name in fields if name not in _DERIVED] + (["all"] if "channel" in fields else [])
+    if isinstance(container, Container):
+        fields = [name for name, f in schema_of(container).items() if f.kind not in (Kind.SETTING, Kind.DERIVED)]
+    else:
+        fields = [f.name for f in dataclasses.fields(container) if f.metadata.get("pytree_node", True)]
+    return fields + (["all"] if "channel" in fields else [])
+
+
+def _readings_of(container: Any, fields: tuple[str, ...]) -> tuple[str, ...]:
+    if isinstance(container, Container):
+        return field_at(type(container), ".".join(fields)).names
+    return _READINGS.get(fields[-1], ())
 
 
 def _refuse_static(path: str, parts: list[str], container: Any) -> None:
     """Says of a field that is there why it cannot be set."""
     part = parts[0] if parts else ""
-    if part in _DERIVED:
+    if isinstance(container, Container) and part in schema_of(container) and _is_derived(container, part):
         refuse(path, part, "what a radar is made from; this is derived from it")
     if part in [f.name for f in dataclasses.fields(container)] and part not in _fields_of(container):
         refuse(path, part, "numbers that leave shapes and code alone; this one belongs into the base")
+
+
+def _is_derived(container: Container, name: str) -> bool:
+    return schema_of(container)[name].kind is Kind.DERIVED
 
 
 def _take(path: str, parts: list[str], position: int, allowed: list[str]) -> str:

@@ -6,89 +6,40 @@ environment, or names one of the paper's (`environment`, `preset`) and what diff
 
 from __future__ import annotations
 
-import dataclasses
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 
-from jrcjax.checks import as_array, refuse
-from jrcjax.model.channel import Channel
-from jrcjax.model.params import FACTORS, EnvParams, check_all_but_radar, check_params, make_factor
+from jrcjax.checks import refuse
+from jrcjax.containers import POSITIVE, Container, Field, Kind, check_value, schema_of
+from jrcjax.files import write_text
+from jrcjax.model.params import EnvParams, check_params
 from jrcjax.model.presets import ENVIRONMENTS, PRESETS, paper_params
-from jrcjax.radar.modes import Radar, make_radar
+from jrcjax.radar.bank import Radar, make_radar
 from jrcjax.radar.paper import MAX_DENSITY
-from jrcjax.types import (
-    COUNT_MODELS,
-    COUNTING_RULES,
-    DISTANCES,
-    EVENT_MODELS,
-    MISS_CONVENTIONS,
-    PLACEMENTS,
-    Int,
-    choice,
-)
 
-_NUMBERS, _INTEGERS, _FLAG = "numbers", "integers", "true or false"
+Schema = dict[str, Field]
+Description = dict[str, Any]
 
-
-class _Key(NamedTuple):
-    """What one key of a file holds."""
-
-    kind: str | tuple[str, ...]
-    """_NUMBERS, _INTEGERS, _FLAG, or the names of a reading."""
-    comment: str
-    """Shape and unit, written beside the value."""
-    required: bool = False
-
-
-_BASE = {
-    "environment": _Key(ENVIRONMENTS, "column of Table I that the rest of the file changes"),
-    "preset": _Key(PRESETS, "reading of Table I"),
+_BASE: Schema = {
+    "environment": Field("environment", Kind.SETTING, names=ENVIRONMENTS, required=False),
+    "preset": Field("preset", Kind.SETTING, names=PRESETS, required=False),
 }
-_TOP = {
-    "reward_weights": _Key(_NUMBERS, "rho_1 to rho_4 of equation (11)", required=True),
-    "event_model": _Key(EVENT_MODELS, "how factors add up to the chance of an event"),
-    "miss_convention": _Key(MISS_CONVENTIONS, "which slots count for miss detection"),
-    "count_event_packets": _Key(_FLAG, "whether packets in a slot with an event count as throughput"),
-    "terminal_time_limit": _Key(_FLAG, "whether the last slot is terminal"),
-    "max_steps_in_episode": _Key(_INTEGERS, "slots per episode"),
-}
-_CHANNEL = {
-    "prior": _Key(_NUMBERS, "probability per level, sum 1", required=True),
-    "persistence": _Key(_NUMBERS, "probability that the level stays, in [0, 1)"),
-    "received_power": _Key(_NUMBERS, "W", required=True),
-    "interference": _Key(_NUMBERS, "W per level", required=True),
-    "noise": _Key(_NUMBERS, "W", required=True),
-    "sinr_threshold": _Key(_NUMBERS, "smallest SINR per data rate, a ratio and not dB, ascending", required=True),
-    "packets": _Key(_NUMBERS, "packets per slot and data rate", required=True),
-}
-_FACTOR = {
-    "prior": _Key(_NUMBERS, "probability per level, sum 1", required=True),
-    "event_probability": _Key(_NUMBERS, "probability of an unexpected event per level", required=True),
-    "persistence": _Key(_NUMBERS, "probability that the level stays, in [0, 1)"),
-}
-_RADAR = {
-    "bandwidth": _Key(_NUMBERS, "Hz per mode", required=True),
-    "slope": _Key(_NUMBERS, "Hz/s per mode", required=True),
-    "max_intermediate_frequency": _Key(_NUMBERS, "Hz per mode", required=True),
-    "density": _Key(_NUMBERS, "objects per 45 m x 45 m", required=True),
-    "class_share": _Key(_NUMBERS, "per class of objects, sum 1", required=True),
-    "size_mean": _Key(_NUMBERS, "length and width in m per class", required=True),
-    "size_std": _Key(_NUMBERS, "their standard deviations in m", required=True),
-    "distance": _Key(DISTANCES, "between objects that are to be resolved"),
-    "counting_rule": _Key(COUNTING_RULES, "which objects count as detected"),
-    "count_model": _Key(COUNT_MODELS, "number of objects, given its mean"),
-    "placements": _Key(PLACEMENTS, "drawn from a bank, or made in every slot"),
-    "bank_size": _Key(_INTEGERS, "placements per mode"),
-    "bank_seed": _Key(_INTEGERS, "of the placements"),
-    "max_density": _Key(_NUMBERS, "largest density that may be set under vmap"),
-    "max_objects": _Key(_INTEGERS, "the same as slots for objects per mode"),
-}
-_TABLES = {"channel": _CHANNEL, **dict.fromkeys(FACTORS[1:], _FACTOR), "radar": _RADAR}
+_ROOM = Field("max_density", Kind.NUMBER, (), POSITIVE, "objects that max_objects leaves room for", required=False)
+
+
+def _keys_of(kind: type[Container]) -> Schema:
+    """What a table may hold: the fields of a container that are neither derived nor tables of their own."""
+    keys = {n: field for n, field in schema_of(kind).items() if field.kind not in (Kind.DERIVED, Kind.PART)}
+    return keys | ({_ROOM.name: _ROOM} if kind is Radar else {})
+
+
+_PARTS = {name: field.part for name, field in schema_of(EnvParams).items() if field.part is not None}
+_TOP = _keys_of(EnvParams)
+_TABLES = {name: _keys_of(kind) for name, kind in _PARTS.items()}
 
 
 def load_params(path: str | Path) -> EnvParams:
@@ -116,7 +67,7 @@ def save_params(path: str | Path, params: EnvParams) -> None:
     Raises:
       ValueError: for parameters that `check_params` refuses, before the file is touched.
     """
-    Path(path).write_text(to_toml(params), encoding="utf-8")
+    write_text(Path(path), to_toml(params))
 
 
 def from_toml(text: str) -> EnvParams:
@@ -124,7 +75,7 @@ def from_toml(text: str) -> EnvParams:
     return params_of(description_of(text))
 
 
-def description_of(text: str) -> dict[str, Any]:
+def description_of(text: str) -> Description:
     """What the text of a file says, key by key and table by table.
 
     Raises:
@@ -133,7 +84,7 @@ def description_of(text: str) -> dict[str, Any]:
     return _checked(tomllib.loads(text))
 
 
-def params_of(description: dict[str, Any]) -> EnvParams:
+def params_of(description: Description) -> EnvParams:
     """The environment that a description (see `description_of`) is of.
 
     Raises:
@@ -141,27 +92,19 @@ def params_of(description: dict[str, Any]) -> EnvParams:
     """
     given = dict(description)
     base = {name: given.pop(name) for name in _BASE if name in given}
-    paper = paper_params(**base) if base else None
-    radar = paper.radar if paper and "radar" not in given else None  # with its bank, which takes seconds to build
-    if paper:
-        given = _merged(_description(paper), given)
+    if base:
+        given = _merged(_description(paper_params(**base)), given)
     for prefix, keys, table in _tables_of(given):
-        for name, key in keys.items():
-            if key.required and name not in table:
-                refuse(f"{prefix}{name}", "missing", f"{key.kind}, {key.comment}")
-    params = EnvParams(
-        channel=_channel(given["channel"]),
-        **{name: make_factor(**_arrays(name, given[name])) for name in FACTORS[1:]},
-        radar=radar,  # pyright: ignore[reportArgumentType]  # built last, when the rest is known to be good
-        reward_weights=jnp.asarray(as_array("reward_weights", given["reward_weights"], _NUMBERS)),
-        event_model=_reading("event_model", given, EVENT_MODELS),
-        miss_convention=_reading("miss_convention", given, MISS_CONVENTIONS),
-        count_event_packets=jnp.int32(given.get("count_event_packets", True)),
-        terminal_time_limit=jnp.int32(given.get("terminal_time_limit", False)),
-        **{name: given[name] for name in ("max_steps_in_episode",) if name in given},
-    )
-    check_all_but_radar(params)
-    params = dataclasses.replace(params, radar=radar or _radar(given["radar"]))
+        for name, field in keys.items():
+            if field.required and name not in table:
+                refuse(f"{prefix}{name}", "missing", field.words)
+    top = {name: value for name, value in given.items() if name not in _TABLES}
+    tables = {name: kind(**given[name]) for name, kind in _PARTS.items() if kind is not Radar}
+    for name, container in tables.items():  # before a bank is built, which takes seconds
+        container.check(name)
+    for name, value in top.items():
+        check_value(EnvParams, name, value)
+    params = EnvParams(**top, **tables, radar=_radar(given["radar"]))
     check_params(params)
     return params
 
@@ -172,24 +115,30 @@ def to_toml(params: EnvParams) -> str:
     return "# An environment of jrcjax; jrcjax.load_params reads it.\n" + text_of(_description(params))
 
 
-def text_of(description: dict[str, Any]) -> str:
+def text_of(description: Description) -> str:
     """The text of a file with this description; the same for equal ones."""
-    lines = [f"{name} = {_toml(description[name])}  # {_BASE[name].comment}" for name in _BASE if name in description]
+    lines = [f"{name} = {_toml(description[name])}  # {_BASE[name].words}" for name in _BASE if name in description]
     for prefix, keys, table in _tables_of(description):
         if prefix and table:
             lines += ["", f"[{prefix.rstrip('.')}]"]
-        lines += [f"{name} = {_toml(table[name])}  # {key.comment}" for name, key in keys.items() if name in table]
+        lines += [f"{name} = {_toml(table[name])}  # {_comment(keys[name])}" for name in keys if name in table]
     return "\n".join(lines).lstrip("\n") + "\n"
 
 
-def _tables_of(description: dict[str, Any]) -> Iterator[tuple[str, dict[str, _Key], dict[str, Any]]]:
+def _comment(field: Field) -> str:
+    if field.names:
+        return ", ".join(field.names)
+    return {Kind.FLAG: field.kind.value, Kind.SETTING: "an integer, or one per radar mode"}.get(field.kind, field.words)
+
+
+def _tables_of(description: Description) -> Iterator[tuple[str, Schema, Description]]:
     """(prefix of dotted names, keys, table) of the file and of each of its tables."""
     yield "", _TOP, description
     for name, keys in _TABLES.items():
         yield f"{name}.", keys, description.get(name, {})
 
 
-def _checked(given: dict[str, Any]) -> dict[str, Any]:
+def _checked(given: Description) -> Description:
     """The same description, if all its keys are known and their values are of the right kind."""
     for name in given:
         if name not in _BASE | _TOP | _TABLES:
@@ -202,77 +151,59 @@ def _checked(given: dict[str, Any]) -> dict[str, Any]:
             if prefix and name not in keys:
                 refuse(f"{prefix}{name}", "an unknown key", ", ".join(keys))
             if name in keys:
-                _check_kind(f"{prefix}{name}", value, keys[name].kind)
+                _check_kind(f"{prefix}{name}", value, keys[name])
     for name in _BASE.keys() & given.keys():
-        _check_kind(name, given[name], _BASE[name].kind)
+        _check_kind(name, given[name], _BASE[name])
     return given
 
 
-def _check_kind(field: str, value: Any, kind: str | tuple[str, ...]) -> None:
-    if isinstance(kind, tuple):
-        allowed = ", ".join(map(repr, kind))
-        if value not in kind:
-            refuse(field, str(value), allowed)
-    elif kind == _FLAG:
+def _check_kind(name: str, value: Any, field: Field) -> None:
+    if field.names:
+        if value not in field.names:
+            refuse(name, str(value), ", ".join(map(repr, field.names)))
+    elif field.kind is Kind.FLAG:
         if not isinstance(value, bool):
-            refuse(field, str(value), kind)
+            refuse(name, str(value), field.kind.value)
     elif isinstance(value, list):
         for entry in value:
-            _check_kind(field, entry, kind)
-    elif isinstance(value, bool) or not isinstance(value, int if kind == _INTEGERS else int | float):
-        refuse(field, str(value), kind)
+            _check_kind(name, entry, field)
+    elif isinstance(value, bool) or not isinstance(value, int | float if field.kind is Kind.NUMBER else int):
+        refuse(name, str(value), (field.kind if field.kind is Kind.NUMBER else Kind.INTEGER).value)
 
 
-def _merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+def _merged(base: Description, changes: Description) -> Description:
     """The paper's description with changes; it holds as large a density as the paper's, as its presets do."""
-    del base["radar"]["max_objects"]
-    base["radar"]["max_density"] = MAX_DENSITY
-    if "max_objects" in changes.get("radar", {}):
-        del base["radar"]["max_density"]
     tables = {name: base[name] | changes.get(name, {}) for name in _TABLES}
+    if "max_objects" not in changes.get("radar", {}):
+        del tables["radar"]["max_objects"]
+        tables["radar"] = {"max_density": MAX_DENSITY} | tables["radar"]
     return base | changes | tables
 
 
-def _arrays(prefix: str, table: dict[str, Any]) -> dict[str, Any]:
-    return {name: jnp.asarray(as_array(f"{prefix}.{name}", value, _NUMBERS)) for name, value in table.items()}
-
-
-def _reading(field: str, table: dict[str, Any], names: tuple[str, ...]) -> Int:
-    return jnp.int32(choice(field, table.get(field, names[0]), names))
-
-
-def _channel(table: dict[str, Any]) -> Channel:
-    return Channel(**_arrays("channel", {"persistence": 0.0} | table))
-
-
-def _radar(table: dict[str, Any]) -> Radar:
-    table = dict(table)
-    slots = table.pop("max_objects", None)
-    if slots is None:
-        return make_radar(**table)
-    if "max_density" in table:
-        refuse("radar.max_density", table["max_density"], "either max_density or max_objects, not both")
+def _radar(table: Description) -> Radar:
     # A number of slots is part of the compiled programs' shapes; an object is the same in any that holds it.
-    return dataclasses.replace(make_radar(**table), max_objects=tuple(slots) if isinstance(slots, list) else slots)
+    slots = table.get("max_objects")
+    fields: dict[str, Any] = table | {"max_objects": tuple(slots) if isinstance(slots, list) else slots}
+    return make_radar(**fields)
 
 
-def _description(params: EnvParams) -> dict[str, Any]:
+def _description(params: EnvParams) -> Description:
     """Plain numbers, names and flags of an environment, table by table."""
-    tables = {name: _values(getattr(params, name), keys) for name, keys in _TABLES.items()}
-    tables["radar"]["bank_size"] = params.radar.miss_bank.shape[-1]
-    return _values(params, _TOP) | tables
+    return _values(params, _TOP) | {name: _values(getattr(params, name), keys) for name, keys in _TABLES.items()}
 
 
-def _values(container: Any, keys: dict[str, _Key]) -> dict[str, Any]:
-    return {name: _value(getattr(container, name), key.kind) for name, key in keys.items() if hasattr(container, name)}
+def _values(container: Container, keys: Schema) -> Description:
+    return {n: _value(getattr(container, n), field) for n, field in keys.items() if hasattr(container, n)}
 
 
-def _value(field: Any, kind: str | tuple[str, ...]) -> Any:
-    if isinstance(kind, tuple):
-        return field if isinstance(field, str) else kind[int(field)]
-    if kind == _FLAG:
-        return bool(field)
-    return _plain(np.asarray(field, np.float32 if kind == _NUMBERS else None))
+def _value(value: Any, field: Field) -> Any:
+    if field.kind is Kind.READING:
+        return field.names[int(value)]
+    if field.kind is Kind.FLAG:
+        return bool(value)
+    if isinstance(value, str | int):
+        return value
+    return _plain(np.asarray(value, np.float32 if field.kind is Kind.NUMBER else None))
 
 
 def _plain(array: np.ndarray) -> Any:

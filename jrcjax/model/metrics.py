@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 
+from jrcjax.readings import MissConvention
 from jrcjax.types import Bool, Float, Int
 
 
@@ -36,8 +37,10 @@ def counted_packets(packets: Float, event: Bool, count_event_packets: Int) -> Fl
 
 
 def counts_for_miss(is_data: Bool, event: Bool, convention: Int) -> Bool:
-    """Whether a slot enters the mean in equation (7), by index into MISS_CONVENTIONS."""
-    return (convention == 0) | ((convention == 1) & event) | ((convention == 2) & ~is_data)
+    """Whether a slot enters the mean in equation (7), by number of a `jrcjax.readings.MissConvention`."""
+    of_event = (convention == MissConvention.EVENT_SLOTS) & event
+    of_radar = (convention == MissConvention.RADAR_SLOTS) & ~is_data
+    return (convention == MissConvention.ALL_SLOTS) | of_event | of_radar
 
 
 def slot_miss(is_data: Bool, radar_miss_ratio: Float) -> Float:

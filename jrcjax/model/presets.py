@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-import jax
-import jax.numpy as jnp
-
 from jrcjax.model.channel import Channel
-from jrcjax.model.params import EnvParams, check_params, make_factor
+from jrcjax.model.params import EnvParams, Factor, check_params
 from jrcjax.radar.paper import paper_radar
-from jrcjax.types import EVENT_MODELS, MISS_CONVENTIONS, choice
+from jrcjax.types import choice
 
 ENVIRONMENTS = ("source", "target")
 PRESETS = ("paper", "paper_table")
@@ -25,15 +22,13 @@ def paper_channel(good: float) -> Channel:
 
     The paper gives the packets (2 and 4) and no powers; any SINRs on these sides of the thresholds are the same model.
     """
-    f32 = lambda x: jnp.asarray(x, jnp.float32)  # noqa: E731
     return Channel(
-        prior=f32([good, 1.0 - good]),
-        persistence=f32(0.0),
-        received_power=f32(1.0),
-        interference=f32([0.0, _db(-10.0)]),
-        noise=f32(_db(-20.0)),
-        sinr_threshold=f32([_db(5.0), _db(15.0)]),
-        packets=f32([2.0, 4.0]),
+        prior=(good, 1.0 - good),
+        received_power=1.0,
+        interference=(0.0, _db(-10.0)),
+        noise=_db(-20.0),
+        packets=(2.0, 4.0),
+        sinr_threshold=(_db(5.0), _db(15.0)),
     )
 
 
@@ -60,19 +55,14 @@ def _paper_params(environment: str, preset: str) -> EnvParams:
     prior = (tau, 1.0 - tau)
     pre_defined = (0.007, 0.07) if source else (0.004, 0.04)
     low_speed = 0.005 if preset == "paper" else 0.05
-    with jax.ensure_compile_time_eval():
-        params = EnvParams(
-            channel=paper_channel(tau),
-            road=make_factor(prior, pre_defined),
-            weather=make_factor(prior, (0.005, 0.046)),
-            speed=make_factor(prior, (low_speed, 0.1 if source else 0.4)),
-            nearby=make_factor(prior, pre_defined),
-            radar=paper_radar(54.0 if source else 27.0),
-            reward_weights=jnp.asarray([1.0, 100.0, 1.0, 50.0], jnp.float32),
-            event_model=jnp.int32(choice("event_model", "conditional", EVENT_MODELS)),
-            miss_convention=jnp.int32(choice("miss_convention", "all_slots", MISS_CONVENTIONS)),
-            count_event_packets=jnp.int32(1),
-            terminal_time_limit=jnp.int32(0),
-        )
+    params = EnvParams(
+        channel=paper_channel(tau),
+        road=Factor(prior=prior, event_probability=pre_defined),
+        weather=Factor(prior=prior, event_probability=(0.005, 0.046)),
+        speed=Factor(prior=prior, event_probability=(low_speed, 0.1 if source else 0.4)),
+        nearby=Factor(prior=prior, event_probability=pre_defined),
+        radar=paper_radar(54.0 if source else 27.0),
+        reward_weights=(1.0, 100.0, 1.0, 50.0),
+    )
     check_params(params)
     return params

@@ -13,7 +13,7 @@ from jrcjax.model.events import event_probability_at
 from jrcjax.model.params import FACTORS, EnvParams
 from jrcjax.model.rewards import reward
 from jrcjax.model.transitions import initial_levels, next_levels
-from jrcjax.radar.modes import slot_miss_ratio
+from jrcjax.radar.bank import slot_miss_ratio
 from jrcjax.types import Bool, Float, Int, Words
 
 NUM_WORDS = len(FACTORS) + 2

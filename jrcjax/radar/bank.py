@@ -1,89 +1,134 @@
-"""The miss ratio of fresh placements, equation (5), and the bank that holds many of them."""
+"""A radar with its bank: the miss ratios of many independent placements per mode, so that a slot costs one look-up.
+
+The bank follows from the radar's other fields, and a `Radar` builds it whenever one is made, so it always fits. Under
+`jit` and `vmap` it is built inside the same program.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import functools
-from typing import TYPE_CHECKING
+from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
 
-from jrcjax.radar import chirp, detection
-from jrcjax.radar.placement import Footprints, object_count, place_objects
-from jrcjax.types import Float, Int, Key
+from jrcjax import rng
+from jrcjax.checks import is_positive, is_traced, refuse, require
+from jrcjax.containers import NOT_NEGATIVE, PROBABILITY, count, derived, integer, option
+from jrcjax.radar.modes import Modes, fresh_miss_ratio, fresh_miss_ratio_of, fresh_placement, room_for
+from jrcjax.radar.placement import Footprints
+from jrcjax.types import Key, Words
 
-if TYPE_CHECKING:  # a Radar builds its bank, so it imports this module
-    from jrcjax.radar.modes import Radar
-
-REFERENCE_SIDE = 45.0
-"""Side in m of the square in which the density omega counts objects."""
-BANK_FIELDS = (
-    "bandwidth",
-    "slope",
-    "max_intermediate_frequency",
-    "density",
-    "class_share",
-    "size_mean",
-    "size_std",
-    "distance",
-    "counting_rule",
-    "count_model",
-    "bank_seed",
-)
-"""Fields of a Radar that its bank depends on."""
+PLACEMENTS = ("bank", "fresh")
 _CHUNK = 256  # placements handled at once while a bank is built: about 10 MB of boxes
+_KNOWN_BANKS = 256  # a bank of two modes takes 32 kB
 
 
-def mean_count(radar: Radar) -> Float:
-    """Mean number of objects in the square of each mode, [K]: omega (R_max / 45 m)^2."""
-    reach = chirp.maximum_range(radar.slope, radar.max_intermediate_frequency)
-    return radar.density * (reach / REFERENCE_SIDE) ** 2
+class Radar(Modes):
+    """K radar modes, the objects around the vehicle, and the bank of placements that slots draw from."""
+
+    placements: str = option(PLACEMENTS)
+    """Reading A7: a slot draws from the bank, or places its objects afresh."""
+    bank_size: int = count(default=4096)
+    """B, the number of placements per mode in the bank."""
+    bank_seed: Int[Array, ""] = integer(NOT_NEGATIVE, default=0)
+    """Seed of the bank's placements."""
+    miss_bank: Float[Array, "K B"] = derived(PROBABILITY)
+    """Miss ratios of the bank's placements, which the other fields decide."""
+
+    def __post_init__(self) -> None:
+        """Builds the bank."""
+        super().__post_init__()
+        object.__setattr__(self, "miss_bank", bank_of(self.modes, self.bank_seed, self.bank_size))
+
+    @property
+    def modes(self) -> Modes:
+        """The radar without its bank."""
+        return Modes(**{field.name: getattr(self, field.name) for field in dataclasses.fields(Modes)})
 
 
-def fresh_placement(key: Key, mode: int, radar: Radar) -> tuple[Int, Footprints]:
-    """A new placement in mode `mode` (static): number of objects, and footprints of as many as there are slots for."""
-    count_key, place_key = jax.random.split(key)
-    count = object_count(count_key, mean_count(radar)[mode], radar.count_model)
-    side = chirp.maximum_range(radar.slope, radar.max_intermediate_frequency)[mode]
-    return count, place_objects(place_key, count, side, radar.classes, radar.max_objects[mode])
+def make_radar(*, max_density: float | None = None, **fields: Any) -> Radar:
+    """A `Radar` from its fields, with room for a larger density.
+
+    Args:
+      max_density: the largest density that `replace` may set under `vmap`; the density itself if None.
+      fields: of `Radar`; those that have a default may be left out.
+
+    Raises:
+      ValueError: naming the field, the value and what is allowed.
+    """
+    if max_density is not None:
+        require("radar.max_density", max_density, (), is_positive, "a number > 0")
+        if fields.get("max_objects") is not None:
+            refuse("radar.max_density", max_density, "either max_density or max_objects, not both")
+        names = {field.name for field in dataclasses.fields(Modes)}
+        modes = Modes(**{name: value for name, value in fields.items() if name in names})
+        scale = max(float(np.float32(max_density) / np.asarray(modes.density)), 1.0)
+        fields["max_objects"] = room_for(modes, scale)
+    return Radar(**fields)
 
 
-def fresh_miss_ratio(key: Key, mode: int, radar: Radar) -> Float:
-    """p_k of one new placement in mode `mode` (static), a scalar; equation (5)."""
-    count, footprints = fresh_placement(key, mode, radar)
-    resolution = chirp.range_resolution(radar.bandwidth)[mode]
-    detected = detection.detected_objects(footprints, resolution, radar.distance, radar.counting_rule)
-    return jnp.where(count <= radar.max_objects[mode], detection.miss_ratio(count, detected), jnp.nan)
+def bank_key(seed: Int[Array, ""], mode: int | Int[Array, ""], i: Int[Array, ""]) -> Key:
+    """The key of placement number `i` of a mode in the bank with this seed."""
+    return jax.random.fold_in(jax.random.fold_in(jax.random.key(seed), mode), i)
 
 
-def fresh_miss_ratio_of(key: Key, mode: Int, radar: Radar) -> Float:
-    """`fresh_miss_ratio` for a mode that is an array; a mode's number of slots is static, so each has its branch."""
-    modes = [functools.partial(fresh_miss_ratio, mode=m, radar=radar) for m in range(radar.num_modes)]
-    return jnp.where((mode >= 0) & (mode < radar.num_modes), jax.lax.switch(mode, modes, key), jnp.nan)
+def bank_of(modes: Modes, seed: Int[Array, ""], size: int) -> Float[Array, "K B"]:
+    """Miss ratios of `size` independent placements per mode; where all numbers are known, made once and kept."""
+    leaves = jax.tree.leaves((modes, seed))
+    if is_traced(*leaves):
+        return _build(modes, seed, size)
+    content = tuple((np.asarray(leaf).tobytes(), leaf.shape) for leaf in leaves)
+    return _known_bank(_Described((content, modes.max_objects, size), modes, seed, size))
 
 
-def bank_key(radar: Radar, mode: Int | int, i: Int) -> Key:
-    """The key of placement number `i` of a mode in the bank."""
-    return jax.random.fold_in(jax.random.fold_in(jax.random.key(radar.bank_seed), mode), i)
+@dataclasses.dataclass(frozen=True)
+class _Described:
+    """What a bank is made from; equal if the bank is."""
+
+    content: tuple[Any, ...]
+    modes: Modes = dataclasses.field(compare=False)
+    seed: Array = dataclasses.field(compare=False)
+    size: int = dataclasses.field(compare=False)
 
 
-def build_bank(radar: Radar, size: int) -> Float:
-    """Miss ratios of `size` independent placements per mode, [K, size]."""
-    bare = dataclasses.replace(radar, miss_bank=jnp.zeros((radar.num_modes, 0)), bank_inputs=jnp.zeros(0))
-    return _build_bank(bare, size)
+@functools.lru_cache(_KNOWN_BANKS)
+def _known_bank(described: _Described) -> Array:
+    with jax.ensure_compile_time_eval():  # kept banks are numbers, also if a trace asks first
+        return _build(described.modes, described.seed, described.size)
 
 
-def bank_inputs(radar: Radar) -> Float:
-    """All numbers that a bank depends on, [n]."""
-    fields = [getattr(radar, name) for name in BANK_FIELDS]
-    return jnp.concatenate([jnp.ravel(jnp.asarray(field)).astype(jnp.float32) for field in fields])
+@jax.jit(static_argnums=2)
+def _build(modes: Modes, seed: Array, size: int) -> Array:
+    def of_mode(mode: int) -> Array:
+        keys = jax.vmap(lambda i: bank_key(seed, mode, i))(jnp.arange(size))
+        return jax.lax.map(lambda key: fresh_miss_ratio(key, mode, modes), keys, batch_size=min(size, _CHUNK))
+
+    return jnp.stack([of_mode(mode) for mode in range(modes.num_modes)])
 
 
-@jax.jit(static_argnums=1)
-def _build_bank(radar: Radar, size: int) -> Float:
-    def of_mode(mode: int) -> Float:
-        keys = jax.vmap(lambda i: bank_key(radar, mode, i))(jnp.arange(size))
-        return jax.lax.map(lambda key: fresh_miss_ratio(key, mode, radar), keys, batch_size=min(size, _CHUNK))
+def slot_miss_ratio(word: Words, mode: Int[Array, ""], radar: Radar) -> Float[Array, ""]:
+    """p_k(t) of one slot in mode `mode`, from one random word.
 
-    return jnp.stack([of_mode(mode) for mode in range(radar.num_modes)])
+    Drawn from the bank, or from a placement made afresh; both have the same distribution over slots.
+    """
+    if radar.placements == "fresh":
+        return fresh_miss_ratio_of(jax.random.key(word), mode, radar)
+    bank = radar.miss_bank
+    return bank[mode, rng.index(word, bank.shape[-1])]
+
+
+def slot_placement(word: Words, mode: int, radar: Radar) -> tuple[Int[Array, ""], Footprints]:
+    """The placement whose miss ratio `slot_miss_ratio` gives for the same word; `mode` is static."""
+    if radar.placements == "fresh":
+        return fresh_placement(jax.random.key(word), mode, radar)
+    number = rng.index(word, radar.miss_bank.shape[-1])
+    return fresh_placement(bank_key(radar.bank_seed, mode, number), mode, radar)
+
+
+def mean_miss_ratio(radar: Radar) -> Float[Array, " K"]:
+    """E[p_k] per mode: the mean of the bank that the slots draw from."""
+    return radar.miss_bank.mean(axis=-1)

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from jrcjax.types import Float
+from typing import TypeVar
+
+import numpy as np
+from jax import Array
+
+A = TypeVar("A", Array, np.ndarray)
 
 SPEED_OF_LIGHT = 299_792_458.0
 """c0 in m/s."""
 
 
-def range_resolution(bandwidth: Float) -> Float:
+def range_resolution(bandwidth: A) -> A:
     """R_re = c0 / (2 b), equation (2).
 
     Args:
@@ -20,7 +25,7 @@ def range_resolution(bandwidth: Float) -> Float:
     return SPEED_OF_LIGHT / (2.0 * bandwidth)
 
 
-def maximum_range(slope: Float, max_intermediate_frequency: Float) -> Float:
+def maximum_range(slope: A, max_intermediate_frequency: A) -> A:
     """R_max = c0 F_max / (2 f_c), equation (2).
 
     Args:

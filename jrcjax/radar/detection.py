@@ -17,6 +17,7 @@ import jax.numpy as jnp
 from jax.custom_batching import custom_vmap
 
 from jrcjax.radar.placement import Footprints
+from jrcjax.readings import CountingRule, Distance
 from jrcjax.types import Bool, Float, Int
 
 
@@ -45,7 +46,7 @@ def boxes(footprints: Footprints, distance: Int) -> Boxes:
 
     Args:
       footprints: N objects.
-      distance: index into DISTANCES, a scalar.
+      distance: number of a `jrcjax.readings.Distance`, a scalar.
     """
     return _sorted_boxes(footprints, distance)[0]
 
@@ -53,8 +54,8 @@ def boxes(footprints: Footprints, distance: Int) -> Boxes:
 def _sorted_boxes(footprints: Footprints, distance: Int) -> tuple[Boxes, Int]:
     """`boxes`, and the indices [N] of the objects that they belong to."""
     x, y = footprints.centre[:, 0], footprints.centre[:, 1]
-    radial = distance == 2
-    extent = jnp.where(distance == 0, footprints.size / 2.0, 0.0)
+    radial = distance == Distance.RADIAL_RANGE
+    extent = jnp.where(distance == Distance.FOOTPRINT_GAP, footprints.size / 2.0, 0.0)
     # The vehicle is at the origin, so the distance from it is the norm of the position.
     along = jnp.where(radial, jnp.hypot(x, y), y)
     across = jnp.where(radial, 0.0, x)
@@ -183,9 +184,8 @@ def detected_objects(footprints: Footprints, resolution: Float, distance: Int, r
     Args:
       footprints: N objects.
       resolution: range resolution in m, a scalar.
-      distance: index into DISTANCES.
-      rule: index into COUNTING_RULES: an object counts if it is resolved from all others, or every cluster of
-        merged objects counts once.
+      distance: number of a `jrcjax.readings.Distance`, a scalar.
+      rule: number of a `jrcjax.readings.CountingRule`, a scalar.
     """
     box = boxes(footprints, distance)
     n = footprints.present.shape[0]
@@ -199,4 +199,4 @@ def detected_objects(footprints: Footprints, resolution: Float, distance: Int, r
         heads = cluster_label(box, resolution) == jnp.arange(n)
         return heads.sum() - (n - total)
 
-    return jax.lax.cond(rule == 1, clusters, resolved, box).astype(jnp.int32)
+    return jax.lax.cond(rule == CountingRule.CLUSTERS, clusters, resolved, box).astype(jnp.int32)

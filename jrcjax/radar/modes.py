@@ -1,85 +1,73 @@
-"""The multi-mode radar: its parameters and the miss-detection ratio of one slot, equation (5).
-
-The bank holds the miss ratios of many independent placements per mode, so that a slot costs one look-up. It is part
-of `Radar` and is built anew whenever `Radar.replace` changes anything that it depends on; under `jit` and `vmap` it is
-built inside the same program.
-"""
+"""The multi-mode radar and the traffic around it, and the miss-detection ratio of one new placement, equation (5)."""
 
 from __future__ import annotations
 
-import dataclasses
+import functools
 import math
-from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from flax import struct
+from jaxtyping import Array, Float, Int
 
-from jrcjax import rng
-from jrcjax.checks import (
-    as_array,
-    is_distribution,
-    is_not_negative,
-    is_positive,
-    is_probability,
-    is_traced,
-    refuse,
-    replaced,
-    require,
-    require_integer,
-    require_reading,
-    require_type,
+from jrcjax.checks import is_traced, refuse
+from jrcjax.containers import (
+    DISTRIBUTION,
+    NOT_NEGATIVE,
+    POSITIVE,
+    Container,
+    number,
+    reading,
+    setting,
 )
-from jrcjax.radar.bank import (
-    BANK_FIELDS,
-    bank_inputs,
-    bank_key,
-    build_bank,
-    fresh_miss_ratio_of,
-    fresh_placement,
-    mean_count,
-)
-from jrcjax.radar.placement import Footprints, ObjectClasses
-from jrcjax.types import COUNT_MODELS, COUNTING_RULES, DISTANCES, PLACEMENTS, Float, Int, Words, choice
+from jrcjax.radar import chirp, detection
+from jrcjax.radar.placement import Footprints, ObjectClasses, object_count, place_objects
+from jrcjax.readings import CountingRule, CountModel, Distance
+from jrcjax.types import Key
 
-_UNLIMITED = 2**31 - 1  # stands for slots that are still to be counted
+REFERENCE_SIDE = 45.0
+"""Side in m of the square in which the density omega counts objects."""
 
 
-@struct.dataclass
-class Radar:
-    """Parameters of K radar modes and of the objects around the vehicle."""
+def _check_max_objects(field: str, value: object) -> None:
+    if value is None:
+        return
+    if not isinstance(value, tuple) or not all(type(slots) is int and slots >= 1 for slots in value):
+        refuse(field, str(value), "a tuple of integers >= 1, one per radar mode")
 
-    bandwidth: Float
-    """[K] sweep bandwidth b in Hz."""
-    slope: Float
-    """[K] chirp slope f_c in Hz/s."""
-    max_intermediate_frequency: Float
-    """[K] F_max in Hz."""
-    density: Float
-    """[] omega, mean number of objects per 45 m x 45 m."""
-    class_share: Float
-    """[C] shares of the classes of objects, sum 1."""
-    size_mean: Float
-    """[C, 2] mean length and width in m."""
-    size_std: Float
-    """[C, 2] standard deviation of length and width in m."""
-    distance: Int
-    """[] index into DISTANCES."""
-    counting_rule: Int
-    """[] index into COUNTING_RULES."""
-    count_model: Int
-    """[] index into COUNT_MODELS."""
-    bank_seed: Int
-    """[] seed of the bank's placements."""
-    miss_bank: Float
-    """[K, B] miss ratios of B independent placements per mode; derived, see `replace`."""
-    bank_inputs: Float
-    """[n] the numbers that the bank was built from, by which `check_params` knows one that no longer fits."""
-    max_objects: tuple[int, ...] = struct.field(pytree_node=False)
-    """K slots for objects; a count above it gives NaN, never a silently smaller number."""
-    placements: str = struct.field(pytree_node=False, default="bank")
-    """One of PLACEMENTS: a slot draws from the bank, or places its objects afresh."""
+
+class Modes(Container):
+    """K radar modes and the objects around the vehicle: all that the miss ratio of a placement depends on."""
+
+    bandwidth: Float[Array, " K"] = number(POSITIVE, "Hz")
+    """Sweep bandwidth b of each mode."""
+    slope: Float[Array, " K"] = number(POSITIVE, "Hz/s")
+    """Chirp slope f_c of each mode."""
+    max_intermediate_frequency: Float[Array, " K"] = number(POSITIVE, "Hz")
+    """F_max of each mode."""
+    density: Float[Array, ""] = number(POSITIVE, "objects per 45 m x 45 m")
+    """omega, the mean number of objects."""
+    class_share: Float[Array, " C"] = number(DISTRIBUTION)
+    """Share of each class of objects."""
+    size_mean: Float[Array, "C 2"] = number(POSITIVE, "m")
+    """Mean length and width of each class of objects."""
+    size_std: Float[Array, "C 2"] = number(NOT_NEGATIVE, "m")
+    """Standard deviation of length and width of each class of objects."""
+    distance: Int[Array, ""] = reading(Distance)
+    """Reading A5: which distance between two objects counts."""
+    counting_rule: Int[Array, ""] = reading(CountingRule)
+    """Reading A5: which objects count as detected."""
+    count_model: Int[Array, ""] = reading(CountModel)
+    """Reading A6: how many objects a placement has."""
+    max_objects: tuple[int, ...] = setting(_check_max_objects, default=None)
+    """Slots for objects in each mode, at least: there are more where a density that is known needs them. If a density
+    is traced and needs more, miss ratios are NaN, never silently smaller."""
+
+    def __post_init__(self) -> None:
+        """Checks the fields, since a bank is made from them at once, and makes room for the objects."""
+        super().__post_init__()
+        self.check("radar")
+        object.__setattr__(self, "max_objects", room_for(self))
 
     @property
     def num_modes(self) -> int:
@@ -91,184 +79,72 @@ class Radar:
         """Shares and sizes of the classes of objects."""
         return ObjectClasses(self.class_share, self.size_mean, self.size_std)
 
+    @property
+    def reach(self) -> Float[Array, " K"]:
+        """Maximum range of each mode in m, equation (2)."""
+        return chirp.maximum_range(self.slope, self.max_intermediate_frequency)
 
-def _replace(self: Radar, **changes) -> Radar:
-    """A copy with the given fields changed and a bank that fits them.
+    @property
+    def resolution(self) -> Float[Array, " K"]:
+        """Range resolution of each mode in m, equation (2)."""
+        return chirp.range_resolution(self.bandwidth)
 
-    Inside `jit` or `vmap`, where a density has no value, `max_objects` stays as it is.
-
-    Raises:
-      ValueError: naming the field, the value and what is allowed.
-    """
-    if changes.keys() <= {"miss_bank", "max_objects", "placements"}:
-        return dataclasses.replace(self, **changes)
-    bank_size = self.miss_bank.shape[-1]
-    modes = np.shape(changes.get("bandwidth", self.bandwidth))
-    unknown = {"miss_bank": np.zeros((*modes, bank_size)), "max_objects": (_UNLIMITED,) * math.prod(modes)}
-    new = replaced(self, **{**unknown, **changes})
-    check_radar(new)
-    given = {
-        name: jnp.asarray(value, getattr(self, name).dtype) for name, value in changes.items() if name != "placements"
-    }
-    new = dataclasses.replace(new, **given, max_objects=capacities(new, self.max_objects))
-    return _with_bank(new, bank_size)
-
-
-# After the class, because flax's decorator sets a `replace` of its own.
-Radar.replace = _replace  # pyright: ignore[reportAttributeAccessIssue]
+    def check(self, name: str = "radar") -> None:
+        """Refuses what is not allowed; see `Container.check`."""
+        super().check(name)
+        if self.max_objects is not None and len(self.max_objects) != self.num_modes:
+            refuse(f"{name}.max_objects", str(self.max_objects), f"{self.num_modes} integers, one per radar mode")
+        if not is_traced(self.density, self.slope, self.max_intermediate_frequency):
+            counts = known_mean_count(self)
+            if not (np.round(counts) >= 1).all():
+                allowed = f"at least one object in every mode, not {counts.tolist()}"
+                refuse(f"{name}.density", float(self.density), allowed)
 
 
-def make_radar(
-    *,
-    bandwidth,
-    slope,
-    max_intermediate_frequency,
-    density: float,
-    class_share,
-    size_mean,
-    size_std,
-    distance: str = "footprint_gap",
-    counting_rule: str = "resolved",
-    count_model: str = "fixed",
-    placements: str = "bank",
-    bank_size: int = 4096,
-    bank_seed: int = 0,
-    max_density: float | None = None,
-) -> Radar:
-    """Builds a `Radar` and its bank; arguments as the fields, readings by name.
+def mean_count(modes: Modes) -> Float[Array, " K"]:
+    """Mean number of objects in the square of each mode: omega (R_max / 45 m)^2."""
+    return modes.density * (modes.reach / REFERENCE_SIDE) ** 2
 
-    `bank_size` is B, the number of placements per mode, and `max_density` the largest density that `replace` may set
-    under `vmap` (the density itself if None).
+
+def known_mean_count(modes: Modes) -> np.ndarray:
+    """`mean_count` of modes whose numbers are known, [K], without compiling anything."""
+    reach = chirp.maximum_range(np.asarray(modes.slope), np.asarray(modes.max_intermediate_frequency))
+    return np.asarray(np.asarray(modes.density) * (reach / REFERENCE_SIDE) ** 2, np.float64)
+
+
+def room_for(modes: Modes, scale: float = 1.0) -> tuple[int, ...]:
+    """Slots for any fixed count, and for a Poisson count but for a chance below 1e-12, at `scale` times the density.
+
+    At least `modes.max_objects`, and these alone where the density is traced.
 
     Raises:
-      ValueError: naming the field, the value and what is allowed.
+      ValueError: where it is traced and there are none.
     """
-    choice("radar.placements", placements, PLACEMENTS)
-    readings = {
-        "distance": choice("radar.distance", distance, DISTANCES),
-        "counting_rule": choice("radar.counting_rule", counting_rule, COUNTING_RULES),
-        "count_model": choice("radar.count_model", count_model, COUNT_MODELS),
-    }
-    for name, value in (("bank_size", bank_size), ("bank_seed", bank_seed)):
-        require_integer(f"radar.{name}", value, 1 if name == "bank_size" else 0)
-    numbers = {
-        "bandwidth": bandwidth,
-        "slope": slope,
-        "max_intermediate_frequency": max_intermediate_frequency,
-        "density": density,
-        "class_share": class_share,
-        "size_mean": size_mean,
-        "size_std": size_std,
-    }
-    arrays = {name: as_array(f"radar.{name}", value, "numbers") for name, value in numbers.items()}
-    modes = arrays["bandwidth"].shape
-    fields: dict[str, Any] = {  # NumPy's arrays, so that checking them compiles nothing
-        **arrays,
-        **{name: np.int32(index) for name, index in readings.items()},
-        "bank_seed": np.int32(bank_seed),
-        "miss_bank": np.zeros((*modes, 1)),
-        "bank_inputs": np.zeros(0),
-    }
-    radar = Radar(**fields, max_objects=(_UNLIMITED,) * math.prod(modes), placements=placements)
-    check_radar(radar)
-    largest = as_array("radar.max_density", density if max_density is None else max_density, "a number > 0")
-    require("radar.max_density", largest, (), is_positive, "a number > 0")
-    scale = max(float(largest / arrays["density"]), 1.0)
-    radar = dataclasses.replace(radar, max_objects=capacities(radar, scale=scale))
-    return _with_bank(jax.tree.map(jnp.asarray, radar), bank_size)
-
-
-def _concrete_counts(radar: Radar) -> np.ndarray:
-    known = {name: np.asarray(getattr(radar, name)) for name in ("density", "slope", "max_intermediate_frequency")}
-    return np.asarray(mean_count(dataclasses.replace(radar, **known)), np.float64)
-
-
-def capacities(radar: Radar, at_least: tuple[int, ...] = (), scale: float = 1.0) -> tuple[int, ...]:
-    """Slots for any fixed count, and for a Poisson count but for a chance below 1e-12, at `scale` times the density."""
-    if is_traced(radar.density, radar.slope, radar.max_intermediate_frequency):
+    at_least = modes.max_objects
+    if is_traced(modes.density, modes.slope, modes.max_intermediate_frequency):
+        if at_least is None:
+            refuse("radar.max_objects", "None", "a tuple of integers where the density has no value yet")
         return at_least
-    mean = _concrete_counts(radar) * scale
+    mean = known_mean_count(modes) * scale
     needed = [math.ceil(m + 8.0 * math.sqrt(m) + 8.0) for m in mean]
-    if len(at_least) != len(needed):
-        return tuple(needed)
-    return tuple(max(pair) for pair in zip(needed, at_least, strict=True))
+    return tuple(max(pair) for pair in zip(needed, at_least or needed, strict=True))
 
 
-def _with_bank(radar: Radar, size: int) -> Radar:
-    return dataclasses.replace(radar, miss_bank=build_bank(radar, size), bank_inputs=bank_inputs(radar))
+def fresh_placement(key: Key, mode: int, modes: Modes) -> tuple[Int[Array, ""], Footprints]:
+    """A new placement in mode `mode` (static): number of objects, and footprints of as many as there are slots for."""
+    count_key, place_key = jax.random.split(key)
+    count = object_count(count_key, mean_count(modes)[mode], modes.count_model)
+    return count, place_objects(place_key, count, modes.reach[mode], modes.classes, modes.max_objects[mode])
 
 
-def slot_miss_ratio(word: Words, mode: Int, radar: Radar) -> Float:
-    """p_k(t) of one slot in mode `mode`, a scalar, from one random word.
-
-    Drawn from the bank, or from a placement made afresh; both have the same distribution over slots.
-    """
-    if radar.placements == "fresh":
-        return fresh_miss_ratio_of(jax.random.key(word), mode, radar)
-    bank = radar.miss_bank
-    return bank[mode, rng.index(word, bank.shape[-1])]
+def fresh_miss_ratio(key: Key, mode: int, modes: Modes) -> Float[Array, ""]:
+    """p_k of one new placement in mode `mode` (static), equation (5)."""
+    count, footprints = fresh_placement(key, mode, modes)
+    detected = detection.detected_objects(footprints, modes.resolution[mode], modes.distance, modes.counting_rule)
+    return jnp.where(count <= modes.max_objects[mode], detection.miss_ratio(count, detected), jnp.nan)
 
 
-def slot_placement(word: Words, mode: int, radar: Radar) -> tuple[Int, Footprints]:
-    """The placement whose miss ratio `slot_miss_ratio` gives for the same word; `mode` is static."""
-    if radar.placements == "fresh":
-        return fresh_placement(jax.random.key(word), mode, radar)
-    return fresh_placement(bank_key(radar, mode, rng.index(word, radar.miss_bank.shape[-1])), mode, radar)
-
-
-def mean_miss_ratio(radar: Radar) -> Float:
-    """E[p_k] per mode, [K]: the mean of the bank that the slots draw from."""
-    return radar.miss_bank.mean(axis=-1)
-
-
-def check_radar(radar: Radar) -> None:
-    """Raises ValueError naming the field, the value and what is allowed."""
-    require_type("radar", radar, Radar)
-    require("radar.bandwidth", radar.bandwidth, (None,), is_positive, "one frequency > 0 Hz per radar mode")
-    modes = np.shape(radar.bandwidth)
-    of_bandwidth = f"radar.bandwidth has {modes[0]}"
-    require("radar.slope", radar.slope, modes, is_positive, f"one slope > 0 Hz/s per radar mode ({of_bandwidth})")
-    field = "radar.max_intermediate_frequency"
-    allowed = f"one frequency > 0 Hz per radar mode ({of_bandwidth})"
-    require(field, radar.max_intermediate_frequency, modes, is_positive, allowed)
-    require("radar.density", radar.density, (), is_positive, "a number of objects > 0 per 45 m x 45 m")
-    share = "probabilities in [0, 1] that sum to 1, one per class of objects"
-    require("radar.class_share", radar.class_share, (None,), is_distribution, share)
-    classes = np.shape(radar.class_share)[0]
-    require("radar.size_mean", radar.size_mean, (classes, 2), is_positive, "length and width > 0 m per class")
-    require("radar.size_std", radar.size_std, (classes, 2), is_not_negative, "deviations >= 0 m per class")
-    require_reading("radar.distance", radar.distance, DISTANCES)
-    require_reading("radar.counting_rule", radar.counting_rule, COUNTING_RULES)
-    require_reading("radar.count_model", radar.count_model, COUNT_MODELS)
-    require("radar.bank_seed", radar.bank_seed, (), is_not_negative, "an integer >= 0", kinds="iu")
-    if radar.placements not in PLACEMENTS:
-        refuse("radar.placements", radar.placements, ", ".join(map(repr, PLACEMENTS)))
-    require(
-        "radar.miss_bank", radar.miss_bank, (*modes, None), is_probability, "ratios in [0, 1], as `replace` draws them"
-    )
-    _check_count(radar)
-
-
-def check_bank(radar: Radar) -> None:
-    """Refuses a bank built for other parameters, as `dataclasses.replace` or a tree operation leaves it behind."""
-    if is_traced(*jax.tree.leaves(radar)):
-        return
-    wanted = np.concatenate([np.ravel(np.asarray(getattr(radar, name), np.float32)) for name in BANK_FIELDS])
-    if not np.array_equal(wanted, np.asarray(radar.bank_inputs)):
-        refuse("radar.miss_bank", "built for other parameters", "the bank that `radar.replace(...)` builds")
-
-
-def _check_count(radar: Radar) -> None:
-    capacities = radar.max_objects
-    allowed = f"a tuple of {radar.num_modes} integers >= 1"
-    if not isinstance(capacities, tuple) or len(capacities) != radar.num_modes:
-        refuse("radar.max_objects", str(capacities), allowed)
-    if not all(type(capacity) is int and capacity >= 1 for capacity in capacities):
-        refuse("radar.max_objects", str(capacities), allowed)
-    if is_traced(radar.density, radar.slope, radar.max_intermediate_frequency):
-        return
-    counts = _concrete_counts(radar)
-    if not (np.round(counts) >= 1).all():
-        refuse("radar.density", float(radar.density), f"at least one object in every mode, not {counts.tolist()}")
-    if (counts > capacities).any():
-        refuse("radar.max_objects", list(capacities), f"at least {np.ceil(counts).tolist()} at this density")
+def fresh_miss_ratio_of(key: Key, mode: Int[Array, ""], modes: Modes) -> Float[Array, ""]:
+    """`fresh_miss_ratio` for a mode that is an array; a mode's number of slots is static, so each has its branch."""
+    branches = [functools.partial(fresh_miss_ratio, mode=m, modes=modes) for m in range(modes.num_modes)]
+    return jnp.where((mode >= 0) & (mode < modes.num_modes), jax.lax.switch(mode, branches, key), jnp.nan)

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
-import jax
-
 from jrcjax.radar import chirp
-from jrcjax.radar.modes import Radar, make_radar
+from jrcjax.radar.bank import Radar, make_radar
 
 _CARS, _PEDESTRIANS = 20, 7  # mean numbers per slot in nuScenes, from which the paper's density of 27 comes
 _RANGES = (225.0, 45.0)  # m, long and short range
@@ -21,21 +17,14 @@ def paper_radar(density: float = 27.0) -> Radar:
 
     One maximum intermediate frequency can't give both ranges that the text states, so each chirp has its own.
     """
-    return _paper_radar(density)
-
-
-@lru_cache
-def _paper_radar(density: float) -> Radar:
-    max_if = [2.0 * r * f / chirp.SPEED_OF_LIGHT for r, f in zip(_RANGES, _SLOPES, strict=True)]
     total = _CARS + _PEDESTRIANS
-    with jax.ensure_compile_time_eval():  # the cache must hold numbers, also when a trace asks first
-        return make_radar(
-            bandwidth=_BANDWIDTHS,
-            slope=_SLOPES,
-            max_intermediate_frequency=max_if,
-            density=density,
-            class_share=(_CARS / total, _PEDESTRIANS / total),
-            size_mean=((4.62, 1.92), (0.73, 0.68)),
-            size_std=((0.18, 0.08), (0.085, 0.055)),
-            max_density=MAX_DENSITY,
-        )
+    return make_radar(
+        bandwidth=_BANDWIDTHS,
+        slope=_SLOPES,
+        max_intermediate_frequency=[2.0 * r * f / chirp.SPEED_OF_LIGHT for r, f in zip(_RANGES, _SLOPES, strict=True)],
+        density=density,
+        class_share=(_CARS / total, _PEDESTRIANS / total),
+        size_mean=((4.62, 1.92), (0.73, 0.68)),
+        size_std=((0.18, 0.08), (0.085, 0.055)),
+        max_density=MAX_DENSITY,
+    )

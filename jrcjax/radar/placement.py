@@ -7,6 +7,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
+from jrcjax.readings import CountModel
 from jrcjax.types import Float, Int, Key
 
 
@@ -32,18 +33,19 @@ class ObjectClasses(NamedTuple):
     """[C, 2] standard deviations in m."""
 
 
-def object_count(key: Key, mean: Float, poisson: Int) -> Int:
+def object_count(key: Key, mean: Float, model: Int) -> Int:
     """Number of objects in one placement, a scalar.
 
     Args:
       key: used by the Poisson count alone.
       mean: expected number of objects, a scalar.
-      poisson: 0 for exactly round(mean) objects, 1 for a Poisson number with that mean.
+      model: number of a `jrcjax.readings.CountModel`, a scalar.
     """
     fixed = jnp.round(mean).astype(jnp.int32)
     # A zero mean draws zero at once, so that fixed counts do not pay for the Poisson sampler's loop.
-    drawn = jax.random.poisson(key, jnp.where(poisson == 1, mean, 0.0), dtype=jnp.int32)
-    return jnp.where(poisson == 1, drawn, fixed)
+    is_poisson = model == CountModel.POISSON
+    drawn = jax.random.poisson(key, jnp.where(is_poisson, mean, 0.0), dtype=jnp.int32)
+    return jnp.where(is_poisson, drawn, fixed)
 
 
 def place_objects(key: Key, count: Int, side: Float, classes: ObjectClasses, capacity: int) -> Footprints:

@@ -7,16 +7,21 @@ the number of agents.
 
 from __future__ import annotations
 
+import functools
+import mmap
 import os
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import jax
 import jax.numpy as jnp
+import jaxlib
 import numpy as np
 from jax.sharding import AxisType, Mesh, PartitionSpec
 
+from jrcjax import numerics
 from jrcjax.checks import refuse
 from jrcjax.machine import usable_cores
 
@@ -32,39 +37,83 @@ _XLA_FLAGS = {
 }
 
 
+def start() -> None:
+    """What every command does before its first array: pinned numerics, all cores, and programs kept compiled.
+
+    Raises:
+      ValueError: naming JAX_PLATFORMS, if this machine has none of the platforms that it asks for.
+    """
+    use_all_cores()
+    keep_compiled()
+    try:
+        jax.devices()
+    except RuntimeError as error:
+        asked = jax.config.jax_platforms or ""  # pyright: ignore[reportAttributeAccessIssue]
+        refuse("JAX_PLATFORMS", asked, f"cpu, or a platform that works here ({str(error).splitlines()[0]})")
+
+
 def use_all_cores() -> None:
-    """Makes one JAX device per core, at least two, and lets XLA use the cores' vector instructions.
+    """Pins numerics, makes one JAX device per core, at least two, and lets XLA use the cores' vector instructions.
 
     XLA compiles other code for a single device, which rounds differently; with two on one core numbers are those of
-    any other number of cores. Call it before any array is made; on an accelerator it changes nothing. Flags that
-    XLA_FLAGS has already are left.
+    any other number of cores. Call it before any array is made; on an accelerator it changes nothing but numerics.
+    Flags that XLA_FLAGS has already are left, and so are those that this jaxlib does not know, which would end the
+    process.
     """
+    numerics.pin()
     given = os.environ.get("XLA_FLAGS", "")
-    added = [f"{name}={value}" for name, value in _XLA_FLAGS.items() if name not in given]
+    missing = {name: value for name, value in _XLA_FLAGS.items() if name not in given}
+    added = [f"{name}={value}" for name, value in missing.items() if _is_known(name, value)]
     os.environ["XLA_FLAGS"] = " ".join([given, *added]).strip()
     jax.config.update("jax_num_cpu_devices", max(usable_cores(), 2))
+
+
+def _is_known(name: str, value: str) -> bool:
+    """Whether jaxlib's library holds all words of a flag; without a library to look into they are taken as unknown."""
+    words = [word for word in re.split(r"[=,]", f"{name},{value}") if not word.isdigit() and word != "true"]
+    return all(map(_in_library, words))
+
+
+@functools.cache
+def _in_library(word: str) -> bool:
+    for path in Path(jaxlib.__file__).parent.glob("*.so"):
+        with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+            if content.find(word.lstrip("-").encode()) >= 0:
+                return True
+    return False
 
 
 def keep_compiled() -> None:
     """Keeps compiled programs on disk, so that a second run starts in seconds.
 
-    The folder is `jrcjax` in XDG_CACHE_HOME, or in ~/.cache; JAX_COMPILATION_CACHE_DIR overrules it.
+    The folder is `jrcjax` in XDG_CACHE_HOME, or in ~/.cache; JAX_COMPILATION_CACHE_DIR overrules it. A user without
+    a home has none.
     """
     if jax.config.jax_compilation_cache_dir is None:  # pyright: ignore[reportAttributeAccessIssue]
-        base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+        try:
+            base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+        except RuntimeError:
+            return
         jax.config.update("jax_compilation_cache_dir", str(Path(base) / "jrcjax"))
         # A command compiles a hundred small programs, too, which take two seconds together.
         jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
 
 
-def mesh() -> Mesh:
-    """All devices along one axis of agents."""
-    return Mesh(np.array(jax.devices()), ("agents",), axis_types=(AxisType.Auto,))
+def mesh(devices: int) -> Mesh:
+    """The first so many devices along one axis of agents."""
+    return Mesh(np.array(jax.devices()[:devices]), ("agents",), axis_types=(AxisType.Auto,))
+
+
+def devices_for(count: int, block: int = BLOCK) -> int:
+    """Devices that work on so many agents: no more than take part in every round of blocks, and two if there are."""
+    blocks, available = -(-count // block), jax.device_count()
+    rounds = -(-blocks // available)
+    return min(max(-(-blocks // rounds), 2), available)
 
 
 def padded(count: int, block: int = BLOCK) -> int:
     """The number of agents that `over_agents` works with for `count` of them: a multiple of block times devices."""
-    unit = block * jax.device_count()
+    unit = block * devices_for(count, block)
     return -(-count // unit) * unit
 
 
@@ -78,11 +127,12 @@ def pad_agents(tree: Any, count: int) -> Any:
 
 
 def groups(tree: Any) -> list[Any]:
-    """Agents in groups that give each device one block, the last of them padded by `pad_agents`.
+    """Agents in groups that give each device that works on them one block, the last of them padded by `pad_agents`.
 
     A function compiled for such a group is the same code for any number of agents, and so are an agent's bits.
     """
-    count, size = jax.tree.leaves(tree)[0].shape[0], padded(1)
+    count = jax.tree.leaves(tree)[0].shape[0]
+    size = BLOCK * devices_for(count)
     whole = pad_agents(tree, padded(count))
     return [jax.tree.map(lambda leaf, i=i: leaf[i : i + size], whole) for i in range(0, padded(count), size)]
 
@@ -98,7 +148,8 @@ def over_agents(function: Callable, block: int = BLOCK, *, in_place: bool = Fals
 
     Returns:
       A function of the same arguments, every leaf of `agents` and of the result with a leading axis of agents, whose
-      length must be a multiple of `block` times the number of devices (see `padded`); otherwise it raises ValueError.
+      length must be a multiple of `block` times the devices that work on it (see `padded`); otherwise it raises
+      ValueError.
     """
     along, everywhere = PartitionSpec("agents"), PartitionSpec()
     of_block = jax.vmap(function, in_axes=(None, 0))
@@ -113,14 +164,13 @@ def over_agents(function: Callable, block: int = BLOCK, *, in_place: bool = Fals
         split = jax.tree.map(lambda a: a.reshape(blocks, block, *a.shape[1:]), agents)
         return _joined(jax.lax.map(lambda agents: of_block(shared, agents), split))
 
-    devices = jax.device_count()
-    sharded = jax.shard_map(on_one_device, mesh=mesh(), in_specs=(everywhere, along), out_specs=along, check_vma=False)
-
     def checked(shared, agents):
         count = jax.tree.leaves(agents)[0].shape[0]
+        devices = devices_for(count, block)
         if count % (block * devices):
             refuse("agents", count, f"a multiple of {block} agents x {devices} devices")
-        return sharded(shared, agents)
+        specs = {"in_specs": (everywhere, along), "out_specs": along}
+        return jax.shard_map(on_one_device, mesh=mesh(devices), **specs, check_vma=False)(shared, agents)
 
     return jax.jit(checked, donate_argnums=1 if in_place else ())
 

@@ -18,7 +18,7 @@ from jrcjax import exact, front
 from jrcjax.config.paths import Points, parameter_at
 from jrcjax.learners.hparams import HParams
 from jrcjax.model.params import EnvParams
-from jrcjax.types import MISS_CONVENTIONS
+from jrcjax.readings import MissConvention
 from paper_figs.analysis.statistics import mean_over_seeds
 
 NAME, TITLE = "front", "Throughput against miss detection: what policies can reach"
@@ -40,7 +40,7 @@ _SETTLED = 0.1  # of the episodes, the last, over which a learner's exact policy
 
 
 def _exact_row(panel: str, params: EnvParams, name: str, value: float, x, y) -> tuple:
-    convention = MISS_CONVENTIONS[int(params.miss_convention)]
+    convention = MissConvention.names()[int(params.miss_convention)]
     return (NAME, panel, convention, name, value, *[float(x)] * 3, *[float(y)] * 3, 0)
 
 
@@ -74,7 +74,7 @@ def random_row(params: EnvParams) -> tuple:
 def learner_rows(params: EnvParams, data: xr.Dataset) -> list[tuple]:
     """The exact policies of the learners in the last tenth of their episodes, with intervals over seeds."""
     last = data.isel(point=0, episode=slice(-max(1, int(_SETTLED * data.sizes["episode"])), None)).mean("episode")
-    convention = MISS_CONVENTIONS[int(params.miss_convention)]
+    convention = MissConvention.names()[int(params.miss_convention)]
     rows = []
     for name in map(str, data["algorithm"].values):
         if name == "round_robin":  # see `random_row`
@@ -106,6 +106,4 @@ def table(params: EnvParams, data: xr.Dataset) -> pd.DataFrame:
 
 
 def _conventions(params: EnvParams) -> list[EnvParams]:
-    return [
-        dataclasses.replace(params, miss_convention=jnp.int32(MISS_CONVENTIONS.index(name))) for name in CONVENTIONS
-    ]
+    return [dataclasses.replace(params, miss_convention=name) for name in CONVENTIONS]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import io
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import NamedTuple, ParamSpec
@@ -12,6 +13,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
+
+from jrcjax.files import write_text, write_whole
 
 P = ParamSpec("P")
 STYLE = Path(__file__).with_name("ieee.mplstyle")
@@ -93,15 +96,23 @@ def save(figure: Figure, path: Path) -> list[Path]:
     written = []
     with mpl.rc_context(fname=STYLE):
         for suffix, metadata in ((".pdf", {"CreationDate": None, "Producer": None}), (".png", {"Software": None})):
-            target = path.with_name(path.name + suffix)
-            figure.savefig(target, metadata=metadata)
+            picture, target = io.BytesIO(), path.with_name(path.name + suffix)
+            figure.savefig(picture, format=suffix[1:], metadata=metadata)
+            write_whole(target, picture.getvalue())
             written.append(target)
     return written
 
 
 def save_pages(figures: Iterable[Figure], path: Path) -> Path:
     """Writes one PDF with a page for each figure; the same figures give the same bytes."""
-    with mpl.rc_context(fname=STYLE), PdfPages(path, metadata={"CreationDate": None, "Producer": None}) as pages:
+    content = io.BytesIO()
+    with mpl.rc_context(fname=STYLE), PdfPages(content, metadata={"CreationDate": None, "Producer": None}) as pages:
         for figure in figures:
             pages.savefig(figure)
+    write_whole(path, content.getvalue())
     return path
+
+
+def save_table(table: pd.DataFrame, path: Path) -> Path:
+    """Writes a table as CSV in UTF-8, numbers with six digits."""
+    return write_text(path, table.to_csv(index=False, float_format="%.6g"))

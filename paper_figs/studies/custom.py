@@ -32,8 +32,7 @@ def write(folder: Path, custom: Custom, seeds: int) -> list[Path]:
     _fit_axis(figure, sweep.x_values, parameter.readings)
     if parameter.readings:
         table["reading"] = [parameter.readings[int(x)] for x in table.x]
-    path = folder / f"{sweep.name}.csv"
-    table.to_csv(path, index=False, float_format="%.6g")
+    path = style.save_table(table, folder / f"{sweep.name}.csv")
     return [path, *style.save(figure, folder / sweep.name)]
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from jrcjax.files import write_text
 from paper_figs.plots import style
 from paper_figs.studies import multiverse, robustness
 from sweeps.preset import slots_of
@@ -21,19 +22,16 @@ HEADLINE = "C5 (highest)"
 
 
 def _write(folder: Path, tables: dict[str, pd.DataFrame]) -> list[Path]:
-    paths = [folder / f"{name}.csv" for name in tables]
-    for path, table in zip(paths, tables.values(), strict=True):
-        table.to_csv(path, index=False, float_format="%.6g")
-    return paths
+    return [style.save_table(table, folder / f"{name}.csv") for name, table in tables.items()]
 
 
 def _manifests(folder: Path, sweeps: tuple[Sweep, ...], out: Path) -> Path:
     """What reproduces the summary: the manifests of all results that it rests on."""
-    path = folder / "manifests.json"
     all_sweeps = [part for sweep in sweeps for part in (sweep, sweep.source) if part]
-    found = {sweep.name: json.loads((out / sweep.name / store.MANIFEST).read_text()) for sweep in all_sweeps}
-    path.write_text(json.dumps(found, indent=1) + "\n")
-    return path
+    found = {
+        sweep.name: json.loads((out / sweep.name / store.MANIFEST).read_text(encoding="utf-8")) for sweep in all_sweeps
+    }
+    return write_text(folder / "manifests.json", json.dumps(found, indent=1) + "\n")
 
 
 def summarise_robustness(sweeps: tuple[Sweep, ...], size: Size, out: Path) -> list[Path]:

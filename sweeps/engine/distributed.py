@@ -162,5 +162,4 @@ def _prepare(share_of: int | None) -> None:
         from distributed import get_worker
 
         os.sched_setaffinity(0, share(sorted(os.sched_getaffinity(0)), int(get_worker().name), share_of))
-    parallel.use_all_cores()
-    parallel.keep_compiled()
+    parallel.start()

@@ -11,12 +11,12 @@ import jax
 import numpy as np
 import xarray as xr
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from jrcjax import files
 from jrcjax.learners import Source
 from jrcjax.machine import usable_cores
 from jrcjax.training.rollout import AgentState, Log
+from sweeps import progress
 from sweeps.engine import estimate
 from sweeps.engine.program import Points, Reference, points_of, reference_of, run_block
 from sweeps.engine.sources import missing_sources, sources_of
@@ -26,13 +26,6 @@ from sweeps.sweep import Size, Sweep
 
 Keep: TypeAlias = Callable[[list[dict[str, AgentState]]], Any]
 """What is done with a block's agents before its part is written."""
-_COLUMNS = (
-    TextColumn("{task.description}"),
-    BarColumn(),
-    TaskProgressColumn(),
-    TimeElapsedColumn(),
-    TimeRemainingColumn(),
-)
 
 
 def blocks(wanted: int, finished: set[int], per_part: int) -> Iterator[range]:
@@ -129,11 +122,9 @@ def _run_blocks(sweep: Sweep, size: Size, out: Path, console: Console, seconds: 
     """Runs what is missing, as it is now that nobody else writes, and shows the progress of so many seconds."""
     points = points_of(sweep, size.preset)
     reference = reference_of(points, size.episodes)
-    with Progress(*_COLUMNS, console=console) as progress:
-        task = progress.add_task(sweep.name, total=seconds)
+    with progress.shown(console, sweep.name, seconds) as told:
         for seeds in to_do(sweep, size, out):
             keep = functools.partial(write_agents, out / sweep.name, sweep, size, points, seeds)
-            told = functools.partial(progress.advance, task)
             _run_block(sweep, size, points, reference, seeds, out, told, keep if save_agents else None)
 
 
@@ -142,10 +133,9 @@ def _run_on_cluster(client: Any, sweep: Sweep, size: Size, out: Path, console: C
     from sweeps.engine import distributed  # which builds upon this module
 
     todo = to_do(sweep, size, out)
-    with Progress(*_COLUMNS, console=console) as progress:
-        task = progress.add_task(f"{sweep.name} on a cluster", total=sum(map(len, todo)))
+    with progress.shown(console, f"{sweep.name} on a cluster", sum(map(len, todo))) as told:
         for seeds in distributed.run_blocks(client, sweep, size, out, todo, save_agents):
-            progress.advance(task, len(seeds))
+            told(len(seeds))
 
 
 def _announcement(sweep: Sweep, size: Size, todo: list[range], seconds: float) -> str:

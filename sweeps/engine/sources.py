@@ -71,6 +71,7 @@ def sources_of(source: Sweep, size: Size, seeds: range, out: Path, advance: Call
         with files.locked(folder, lambda held: print(f"{held}; waiting for its agents", file=sys.stderr)):
             if missing := missing_sources(source, size, seeds, out):
                 store.add_part(folder, missing, trained(source, size, missing, advance)[1])
+    store.write_manifest(folder)  # which a killed process may not have come to
     return _load(source, size, seeds, folder)
 
 

@@ -143,6 +143,7 @@ def _sweep_of(part: Part, sweeps: Mapping[str, Sweep]) -> Sweep:
 def made_elsewhere(part: Part) -> list[str]:
     """What was different where a part was made, of what decides the last bit of its numbers."""
     made, machine = part.provenance, provenance.machine()
-    there = {"cpu_features": made["machine"].get("cpu_features")} | made["versions"]
-    here = {"cpu_features": machine["cpu_features"]} | provenance.versions()
+    decisive = ("cpu_features", "xla_flags")
+    there = {name: made["machine"].get(name) for name in decisive} | made["versions"]
+    here = {name: machine[name] for name in decisive} | provenance.versions()
     return [f"{name}: {there.get(name)} there, {here[name]} here" for name in here if there.get(name) != here[name]]

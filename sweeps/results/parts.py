@@ -90,21 +90,26 @@ def described(path: Path) -> Part:
     Raises:
       DamagedFile: if it is not what was written, or no part, or has not the name of its seeds.
     """
-    stat = path.stat()
+    stat = files.status_of(path)
     return _described(path, (stat.st_ino, stat.st_size, stat.st_mtime_ns))
 
 
 @functools.cache
 def _described(path: Path, as_of: tuple[int, int, int]) -> Part:
     """Read once per process, unless the file changed since."""
-    content = files.unsealed(path)
     try:
-        with xr.open_dataset(io.BytesIO(content), engine="h5netcdf") as data:
-            numbers = data["seed"].values.tolist()
-            about = {name: json.loads(data.attrs[name]) for name in ("configuration", "provenance")}
-            digest = data.attrs["digest"]
-    except (OSError, RuntimeError, ValueError, LookupError, AttributeError) as error:
-        raise files.DamagedFile(f"it is not a part of results ({error})") from error
+        data = read_part(path)
+        numbers = data["seed"].values.tolist()
+        about = {name: json.loads(data.attrs[name]) for name in ("configuration", "provenance")}
+        digest = digest_of_results(data)
+    except (files.DamagedFile, MemoryError):
+        raise
+    except Exception as error:  # whatever readers of netCDF and of JSON say
+        raise files.DamagedFile(f"it is not a part of results ({str(error)[:200]})") from error
+    if not all(isinstance(said, dict) for said in about.values()) or "finished" not in about["provenance"]:
+        raise files.DamagedFile("it does not say where it comes from")
+    if digest != data.attrs.get("digest"):
+        raise files.DamagedFile("its digest is not that of its content")
     seeds = range(numbers[0], numbers[-1] + 1)
     if list(seeds) != numbers or part_path(path.parent, seeds).name != path.name:
         raise files.DamagedFile(f"it holds seeds {numbers[0]} to {numbers[-1]}")

@@ -6,7 +6,6 @@ folder, for a reader; it follows from the parts and is written anew whenever it 
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 import json
 from dataclasses import asdict
@@ -17,10 +16,11 @@ import jax
 import numpy as np
 import xarray as xr
 
-from jrcjax import files
+from jrcjax import files, numerics
 from jrcjax.exact import LongRun
 from jrcjax.learners.hparams import HParams
 from jrcjax.model.params import EnvParams
+from jrcjax.named import named_arrays, named_settings
 from jrcjax.provenance import provenance
 from jrcjax.training.rollout import Log
 from sweeps import interrupts
@@ -41,10 +41,11 @@ class ConfigurationMismatch(ValueError):
 
 
 def digest_of(points: EnvParams) -> str:
-    """Hash of every number of the environments, but for the bank, which follows from the others."""
-    bare = dataclasses.replace(points, radar=dataclasses.replace(points.radar, miss_bank=np.zeros(0)))
-    content = b"".join(np.asarray(leaf).tobytes() for leaf in jax.tree.leaves(bare))
-    return hashlib.sha256(content + repr(jax.tree.structure(bare)).encode()).hexdigest()[:16]
+    """Hash of every number and setting of the environments, but for what is derived from the others."""
+    digest = hashlib.sha256(repr(named_settings(points)).encode())
+    for name, leaf in named_arrays(points).items():
+        digest.update(f"{name} {leaf.dtype} {leaf.shape} ".encode() + np.asarray(leaf).tobytes())
+    return digest.hexdigest()[:16]
 
 
 def configuration(sweep: Sweep, size: Size) -> dict[str, Any]:
@@ -58,6 +59,7 @@ def configuration(sweep: Sweep, size: Size) -> dict[str, Any]:
         "x": {sweep.x_name: sweep.x_values},
         "environments": digest_of(points.params),
         "hparams": {name: _plain(getattr(points.hparams, name)) for name in vars(HParams())},
+        "numerics": numerics.in_force(),
         "config": {name: value for name, value in asdict(sweep.config(size)).items() if name != "episodes"},
     }
     if sweep.recipe:
@@ -160,12 +162,25 @@ def write_manifest(folder: Path) -> None:
         "configuration": parts[0].configuration,
         "seeds": sorted({seed for part in parts for seed in part.seeds}),
         "parts": {part.path.name: part.digest for part in parts},
-        **max((part.provenance for part in parts), key=lambda made: made["finished"]),
+        **_origins([part.provenance for part in parts]),
     }
-    text = (json.dumps(manifest, indent=2) + "\n").encode()
+    text = json.dumps(manifest, indent=2) + "\n"
     path = folder / MANIFEST
-    if not path.is_file() or path.read_bytes() != text:
-        files.write_whole(path, text)
+    if not path.is_file() or path.read_bytes() != text.encode():
+        files.write_text(path, text)
+
+
+def _origins(made: list[dict[str, Any]]) -> dict[str, Any]:
+    """Where all parts come from, field by field: one value if it is the same everywhere, else all of them in a list.
+
+    Of the time it is the latest.
+    """
+    found = {"finished": max(origin["finished"] for origin in made)}
+    for field in {name: None for origin in made for name in origin if name != "finished"}:
+        values = [origin.get(field) for origin in made]
+        different = [value for i, value in enumerate(values) if value not in values[:i]]
+        found[field] = different[0] if len(different) == 1 else different
+    return found
 
 
 def load(folder: Path, seeds: int) -> xr.Dataset:

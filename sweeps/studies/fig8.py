@@ -15,7 +15,7 @@ from sweeps.sweep import Sweep
 def params_at(density: float, preset: str) -> EnvParams:
     """The target environment with omega = density."""
     params = environment_of("target", preset)
-    return dataclasses.replace(params, radar=params.radar.replace(density=density))  # pyright: ignore
+    return dataclasses.replace(params, radar=params.radar.replace(density=density))
 
 
 FIG8 = Sweep(

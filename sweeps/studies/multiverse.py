@@ -17,9 +17,9 @@ import numpy as np
 
 from jrcjax.learners.hparams import HParams
 from jrcjax.model.params import EnvParams
-from jrcjax.radar.modes import Radar
+from jrcjax.readings import EventModel, MissConvention
 from jrcjax.training.transfer import TARGET_LEARNERS
-from jrcjax.types import COUNTING_RULES, DISTANCES, EVENT_MODELS, INITIAL_WEIGHTS, MISS_CONVENTIONS, choice
+from jrcjax.types import INITIAL_WEIGHTS, choice
 from sweeps.preset import environment_of
 from sweeps.studies import fig6, fig7, fig8, fig9
 from sweeps.sweep import Size, Study, Sweep
@@ -52,9 +52,9 @@ class Universe(NamedTuple):
 
 
 LEVELS: dict[str, tuple[Any, ...]] = {
-    "event_model": EVENT_MODELS,
+    "event_model": EventModel.names(),
     "low_speed_event_probability": (0.005, 0.05),
-    "miss_convention": MISS_CONVENTIONS,
+    "miss_convention": MissConvention.names(),
     "resolution": (("footprint_gap", "resolved"), ("centre_to_centre", "resolved"), ("footprint_gap", "clusters")),
     "time_limit": ("truncation", "terminal"),
     "epsilon_episodes": (100, 50, 400),
@@ -106,33 +106,16 @@ POINTS = (
 
 def read_as(params: EnvParams, universe: Universe) -> EnvParams:
     """An environment of the paper in a universe."""
+    distance, rule = universe.resolution
     probability = params.speed.event_probability.at[0].set(universe.low_speed_event_probability)
     return dataclasses.replace(
         params,
         speed=dataclasses.replace(params.speed, event_probability=probability),
-        radar=_radar(params.radar, *universe.resolution),
-        event_model=jnp.int32(choice("event_model", universe.event_model, EVENT_MODELS)),
-        miss_convention=jnp.int32(choice("miss_convention", universe.miss_convention, MISS_CONVENTIONS)),
-        terminal_time_limit=jnp.int32(universe.time_limit == "terminal"),
+        radar=params.radar.replace(distance=distance, counting_rule=rule),
+        event_model=universe.event_model,
+        miss_convention=universe.miss_convention,
+        terminal_time_limit=universe.time_limit == "terminal",
     )
-
-
-def _radar(radar: Radar, distance: str, rule: str) -> Radar:
-    """A radar under a reading."""
-    readings = {
-        "distance": choice("distance", distance, DISTANCES),
-        "counting_rule": choice("counting_rule", rule, COUNTING_RULES),
-    }
-    if all(int(getattr(radar, name)) == index for name, index in readings.items()):
-        return radar
-    # The new bank takes seconds to draw, and universes share it.
-    made_from = (*np.asarray(radar.bank_inputs).tolist(), radar.max_objects, *readings.values())
-    if made_from not in _RADARS:
-        _RADARS[made_from] = radar.replace(**{name: jnp.int32(index) for name, index in readings.items()})  # pyright: ignore
-    return _RADARS[made_from]
-
-
-_RADARS: dict[tuple, Radar] = {}
 
 
 def hparams_of(hparams: HParams, universe: Universe) -> HParams:

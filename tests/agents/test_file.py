@@ -14,7 +14,7 @@ from safetensors.numpy import load_file, save_file
 import jrcjax
 from jrcjax import exact
 from jrcjax.agents import file as agent_file
-from jrcjax.model.params import make_factor
+from jrcjax.model.params import Factor
 from sweeps.engine.program import points_of
 from sweeps.engine.run import run_sweep
 from sweeps.results import store
@@ -53,7 +53,7 @@ def trainer(learner):
 @pytest.fixture(scope="module")
 def other(params):
     """An environment like it."""
-    return params.replace(speed=make_factor((0.3, 0.7), (0.01, 0.2)), event_model=jnp.int32(1))
+    return params.replace(speed=Factor(prior=(0.3, 0.7), event_probability=(0.01, 0.2)), event_model=jnp.int32(1))
 
 
 @pytest.fixture(scope="module")
@@ -178,7 +178,7 @@ def test_it_is_evaluated_in_any_environment_like_it(saved, params, other):
 )
 def test_evaluations_that_do_not_fit_are_refused(change, message, saved, params):
     if "params" in change:
-        change = {"params": params.replace(road=make_factor((0.5, 0.3, 0.2), (0.0, 0.1, 0.2)))}
+        change = {"params": params.replace(road=Factor(prior=(0.5, 0.3, 0.2), event_probability=(0.0, 0.1, 0.2)))}
     with pytest.raises(ValueError, match=message):
         saved["ddqn"].evaluate(**change)
 

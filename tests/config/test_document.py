@@ -8,7 +8,7 @@ from jrcjax.config import document
 from jrcjax.learners.hparams import Config, HParams
 from jrcjax.model.channel import Channel
 from jrcjax.model.params import EnvParams, Factor
-from jrcjax.radar.modes import Radar
+from jrcjax.radar import Radar
 
 
 def test_the_page_is_up_to_date():
@@ -24,7 +24,10 @@ def test_every_field_says_what_it_means(kind):
 
 def test_a_meaning_is_the_docstring_under_the_field():
     assert document.fields_of(HParams)["step_constant"].startswith("If positive, Q-learning's step size instead")
-    assert document.fields_of(EnvParams)["event_model"] == "[] index into EVENT_MODELS."
+    assert (
+        document.fields_of(EnvParams)["event_model"]
+        == "Reading A1: how the factors add up to the probability of an event."
+    )
     assert document.fields_of(EnvParams)["road"] == ""
 
 
@@ -34,5 +37,5 @@ def test_every_field_is_on_the_page_with_its_value():
         for field in dataclasses.fields(kind):
             assert f"| `{field.name}` |" in page
     assert "| `learning_rate` | float | 0.001 |" in page
-    assert "| `event_probability` | float | 0.005, 0.1 | 0.005, 0.4 |" in page
+    assert "| `event_probability` | float [J] | 0.005, 0.1 | 0.005, 0.4 | numbers, one per level, in [0, 1] |" in page
     assert "| `hidden` | tuple[int, ...], static | 24, 24 |" in page

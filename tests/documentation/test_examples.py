@@ -12,7 +12,7 @@ from tiny import tiny_params
 
 import jrcjax
 from jrcjax.learners import Spec
-from jrcjax.model.params import make_factor
+from jrcjax.model.params import Factor
 from jrcjax.replay.uniform import Transition
 from jrcjax.training.rollout import init_agent, learner_for
 
@@ -94,7 +94,7 @@ def test_stable_baselines3_beside_ours():
 
 def test_a_state_space_too_large_to_enumerate_trains():
     """100 levels of four factors: 300 million states, of which no array is ever made."""
-    levels = make_factor(np.full(100, 0.01), np.linspace(0.0, 0.1, 100))
+    levels = Factor(prior=np.full(100, 0.01), event_probability=np.linspace(0.0, 0.1, 100))
     params = tiny_params().replace(road=levels, weather=levels, speed=levels, nearby=levels)
     jrcjax.check_params(params)
     assert params.num_states == 300_000_000
@@ -110,7 +110,7 @@ def test_a_state_space_too_large_to_enumerate_trains():
 
 
 def test_ids_that_int32_cannot_hold_are_refused():
-    levels = make_factor(np.full(200, 0.005), np.linspace(0.0, 0.1, 200))
+    levels = Factor(prior=np.full(200, 0.005), event_probability=np.linspace(0.0, 0.1, 200))
     params = tiny_params().replace(road=levels, weather=levels, speed=levels, nearby=levels)
     with pytest.raises(ValueError, match=r"shape: '\(3, 200, 200, 200, 200\), 4800000000 states'; allowed: fewer than"):
         jrcjax.check_params(params)

@@ -11,7 +11,7 @@ from jrcjax import exact
 from jrcjax.learners import Spec, q_learning, round_robin
 from jrcjax.learners.hparams import Config, HParams
 from jrcjax.model import events
-from jrcjax.model.params import EnvParams, make_factor
+from jrcjax.model.params import EnvParams, Factor
 from jrcjax.replay.uniform import Transition
 from jrcjax.training import parallel, rollout
 
@@ -82,10 +82,10 @@ def environment(levels: int, persistence: float) -> EnvParams:
     prior = [1.0 / levels] * levels
     return params.replace(
         channel=params.channel.replace(prior=jnp.full(2, 0.5), persistence=jnp.float32(persistence)),
-        road=make_factor(prior, [0.05, 0.2][:levels], persistence),
-        weather=make_factor(prior, [0.02, 0.1][:levels]),
-        speed=make_factor(prior, [0.01, 0.3][:levels]),
-        nearby=make_factor([0.5, 0.5], [0.03, 0.25], persistence),
+        road=Factor(prior=prior, event_probability=[0.05, 0.2][:levels], persistence=persistence),
+        weather=Factor(prior=prior, event_probability=[0.02, 0.1][:levels]),
+        speed=Factor(prior=prior, event_probability=[0.01, 0.3][:levels]),
+        nearby=Factor(prior=[0.5, 0.5], event_probability=[0.03, 0.25], persistence=persistence),
         reward_weights=jnp.asarray([1.0, 10.0, 1.0, 5.0]),
         max_steps_in_episode=1000,
     )

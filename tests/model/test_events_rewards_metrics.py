@@ -11,7 +11,7 @@ from numpy_model import Model
 from jrcjax import rng
 from jrcjax.model import channel, events, metrics, rewards, slot, states, transitions
 from jrcjax.radar import chirp
-from jrcjax.types import EVENT_MODELS, MISS_CONVENTIONS
+from jrcjax.readings import EventModel, MissConvention
 
 # Sums and products of about ten float32 numbers.
 RTOL = 10 * float(np.finfo(np.float32).eps)
@@ -91,9 +91,9 @@ def test_rate_decodes_from_its_threshold_on(strict):
     assert _sent(link, 3) == [[3.0, 7.0], [3.0, 7.0], [3.0, 0.0]]
 
 
-@pytest.mark.parametrize("reading", EVENT_MODELS)
+@pytest.mark.parametrize("reading", EventModel)
 def test_event_probability(any_params, reading, strict):
-    params = any_params.replace(event_model=jnp.int32(EVENT_MODELS.index(reading)))
+    params = any_params.replace(event_model=reading)
     probability = events.event_probability(params)
     # The third reading subtracts from 1, so its error is relative to 1.
     np.testing.assert_allclose(probability, Model(params).event, rtol=RTOL, atol=5 * np.finfo(np.float32).eps)
@@ -162,10 +162,10 @@ def _measured(episode, params):
 
 
 @pytest.mark.parametrize("count_event_packets", [0, 1])
-@pytest.mark.parametrize("convention", MISS_CONVENTIONS)
+@pytest.mark.parametrize("convention", MissConvention)
 def test_metrics_of_an_episode(target, convention, count_event_packets, strict):
     params = target.replace(
-        miss_convention=jnp.int32(MISS_CONVENTIONS.index(convention)),
+        miss_convention=convention,
         count_event_packets=jnp.int32(count_event_packets),
     )
     sums = _measured(EPISODE, params)
@@ -176,7 +176,7 @@ def test_metrics_of_an_episode(target, convention, count_event_packets, strict):
 
 @pytest.mark.parametrize(("convention", "slots"), [("event_slots", EPISODE[:1]), ("radar_slots", EPISODE[:2])])
 def test_miss_detection_of_no_slot_is_nan(target, convention, slots):
-    params = target.replace(miss_convention=jnp.int32(MISS_CONVENTIONS.index(convention)))
+    params = target.replace(miss_convention=convention)
     assert np.isnan(metrics.miss_detection(_measured(slots, params)))
 
 

@@ -14,6 +14,7 @@ from trees import by_name
 import jrcjax
 from jrcjax import exact
 from jrcjax.learners.hparams import HParams
+from jrcjax.readings import CountingRule, Distance, EventModel, MissConvention
 from paper_figs.analysis import ranking
 from paper_figs.claims.judge import Judgement, verdicts
 from paper_figs.studies import multiverse
@@ -97,11 +98,11 @@ def test_universes_read_the_paper_as_they_say():
     for number, universe in list(enumerate(universes))[::5]:
         x = float(number * len(POINTS))
         params, hparams = sweep.params_at(x, "paper"), sweep.hparams_at(x)
-        assert jrcjax.types.EVENT_MODELS[int(params.event_model)] == universe.event_model
-        assert jrcjax.types.MISS_CONVENTIONS[int(params.miss_convention)] == universe.miss_convention
+        assert EventModel.names()[int(params.event_model)] == universe.event_model
+        assert MissConvention.names()[int(params.miss_convention)] == universe.miss_convention
         read = (
-            jrcjax.types.DISTANCES[int(params.radar.distance)],
-            jrcjax.types.COUNTING_RULES[int(params.radar.counting_rule)],
+            Distance.names()[int(params.radar.distance)],
+            CountingRule.names()[int(params.radar.counting_rule)],
         )
         assert read == universe.resolution
         np.testing.assert_allclose(params.speed.event_probability[0], universe.low_speed_event_probability)

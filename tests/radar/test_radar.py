@@ -7,16 +7,17 @@ import jax.numpy as jnp
 import numpy as np
 import numpy_model
 import pytest
+from compiling import nothing_compiles
 from scipy import stats
 from significance import ALPHA, means_differ, same_law, z
 
 from jrcjax import radar
 from jrcjax.model import slot
-from jrcjax.radar import bank, detection, placement
+from jrcjax.radar import detection, modes, placement
 from jrcjax.radar.placement import Footprints
-from jrcjax.types import COUNTING_RULES, DISTANCES
+from jrcjax.readings import CountingRule, CountModel, Distance
 
-READINGS = [(distance, rule) for distance in DISTANCES for rule in COUNTING_RULES]
+READINGS = [(distance, rule) for distance in Distance.names() for rule in CountingRule.names()]
 CAPACITY = 320  # of the footprints in most of the tests
 LONG, SHORT = 0, 1
 
@@ -58,7 +59,7 @@ def assert_counts_agree(footprints, resolution, distance, rule, rounding):
     The twin counts at a resolution smaller and larger by the rounding of a float32 coordinate: where both agree, no
     gap is a near tie and the count must be exactly theirs.
     """
-    got = int(detect(footprints, jnp.float32(resolution), DISTANCES.index(distance), COUNTING_RULES.index(rule)))
+    got = int(detect(footprints, jnp.float32(resolution), Distance[distance.upper()], CountingRule[rule.upper()]))
     present = np.asarray(footprints.present)
     gap = numpy_model.gaps(footprints.centre[present], footprints.size[present], distance)
     most, least = (numpy_model.detected(gap, np.float32(resolution) + d, rule) for d in (-rounding, rounding))
@@ -103,7 +104,7 @@ def test_readings_by_hand(distance, rule, resolution, expected):
     # Radial ranges 10, hypot(10, 3) = 10.44 and 40.
     centre = jnp.asarray([[10.0, 0.0], [10.0, 3.0], [40.0, 0.0]])
     footprints = Footprints(centre, jnp.full((3, 2), jnp.asarray([4.0, 2.0])), jnp.ones(3, bool))
-    got = detect(footprints, jnp.float32(resolution), DISTANCES.index(distance), COUNTING_RULES.index(rule))
+    got = detect(footprints, jnp.float32(resolution), Distance[distance.upper()], CountingRule[rule.upper()])
     assert int(got) == expected
 
 
@@ -130,18 +131,18 @@ def test_miss_ratio_of_counts(strict):
 
 
 def test_fixed_counts(target, source):
-    np.testing.assert_array_equal(np.round(bank.mean_count(target.radar)), [675, 27])
-    np.testing.assert_array_equal(np.round(bank.mean_count(source.radar)), [1350, 54])
+    np.testing.assert_array_equal(np.round(modes.mean_count(target.radar)), [675, 27])
+    np.testing.assert_array_equal(np.round(modes.mean_count(source.radar)), [1350, 54])
     for omega in range(1, 55):
-        means = bank.mean_count(dataclasses.replace(target.radar, density=jnp.float32(omega)))
-        counts = [int(placement.object_count(jax.random.key(0), mean, jnp.int32(0))) for mean in means]
+        means = modes.mean_count(target.radar.modes.replace(density=omega))
+        counts = [int(placement.object_count(jax.random.key(0), mean, CountModel.FIXED)) for mean in means]
         assert counts == [25 * omega, omega]
 
 
 def test_poisson_counts():
     draw = jax.jit(jax.vmap(placement.object_count, in_axes=(0, None, None)))
     for seed, mean in enumerate((0.7, 27.0, 675.0)):
-        counts = np.asarray(draw(jax.random.split(jax.random.key(seed), 20_000), jnp.float32(mean), jnp.int32(1)))
+        counts = np.asarray(draw(jax.random.split(jax.random.key(seed), 20_000), jnp.float32(mean), CountModel.POISSON))
         # Index of dispersion, and the mean through the sum, itself a Poisson number.
         dispersion = ((counts - counts.mean()) ** 2).sum() / counts.mean()
         freedom = len(counts) - 1
@@ -173,19 +174,19 @@ def test_larger_capacity_changes_nothing():
     start = small_radar()
     ratios = []
     for extra in (0, 57):  # in all, on both sides of a power of two
-        larger = start.replace(max_objects=tuple(n + extra for n in start.max_objects))
-        ratios.append(jax.jit(jax.vmap(lambda key, r=larger: bank.fresh_miss_ratio(key, LONG, r)))(keys))
+        larger = start.modes.replace(max_objects=tuple(n + extra for n in start.max_objects))
+        ratios.append(jax.jit(jax.vmap(lambda key, m=larger: modes.fresh_miss_ratio(key, LONG, m)))(keys))
     assert len(np.unique(ratios[0])) > 3
     np.testing.assert_array_equal(*ratios)
 
 
 def test_density_and_mode_as_axes():
     start, key = small_radar(), jax.random.key(7)
-    densities, modes = [6.0, 24.0, 60.0, 24.0, 60.0], [LONG, LONG, LONG, SHORT, SHORT]
+    densities, of_modes = [6.0, 24.0, 60.0, 24.0, 60.0], [LONG, LONG, LONG, SHORT, SHORT]
     together = jax.jit(jax.vmap(lambda density, mode: radar.miss_ratio(key, density, mode, radar=start)))(
-        jnp.asarray(densities), jnp.asarray(modes)
+        jnp.asarray(densities), jnp.asarray(of_modes)
     )
-    one_by_one = [radar.miss_ratio(key, d, mode, radar=start) for d, mode in zip(densities, modes, strict=True)]
+    one_by_one = [radar.miss_ratio(key, d, mode, radar=start) for d, mode in zip(densities, of_modes, strict=True)]
     assert len(np.unique(together)) > 2
     np.testing.assert_array_equal(together, one_by_one)
 
@@ -265,13 +266,33 @@ def test_bank_seed_decides():
 def test_replace_builds_the_bank_anew():
     start = small_radar()
     for density in (12.0, 48.0):
-        changed = start.replace(density=jnp.float32(density))
+        changed = start.replace(density=density)
         np.testing.assert_array_equal(changed.miss_bank, small_radar(density=density).miss_bank)
-    for field, value in (("counting_rule", 1), ("distance", 2), ("count_model", 1), ("bank_seed", 5)):
-        assert (start.replace(**{field: jnp.int32(value)}).miss_bank != start.miss_bank).any(), field
+        np.testing.assert_array_equal(dataclasses.replace(start, density=density).miss_bank, changed.miss_bank)
+    for field, value in (
+        ("counting_rule", 1),
+        ("distance", "radial_range"),
+        ("count_model", "poisson"),
+        ("bank_seed", 5),
+    ):
+        assert (start.replace(**{field: value}).miss_bank != start.miss_bank).any(), field
     assert (start.replace(size_mean=2.0 * start.size_mean).miss_bank != start.miss_bank).any()
     assert (start.replace(bandwidth=0.1 * start.bandwidth).miss_bank != start.miss_bank).any()
+    assert start.replace(bank_size=32).miss_bank.shape == (2, 32)
     np.testing.assert_array_equal(start.replace(placements="fresh").miss_bank, start.miss_bank)
+
+
+def test_a_bank_is_made_once_for_the_same_numbers():
+    with nothing_compiles():
+        again = small_radar().replace(placements="fresh")
+    assert again.miss_bank is small_radar().miss_bank
+
+
+def test_a_bank_cannot_be_set():
+    with pytest.raises(ValueError, match="miss_bank"):
+        small_radar().replace(miss_bank=jnp.zeros((2, 4096)))
+    with pytest.raises(ValueError, match="miss_bank"):
+        dataclasses.replace(small_radar(), miss_bank=jnp.zeros((2, 4096)))
 
 
 @pytest.mark.slow

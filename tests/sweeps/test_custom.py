@@ -8,8 +8,8 @@ import xarray as xr
 
 import jrcjax
 from jrcjax.config.paths import parameter_at
-from jrcjax.model.params import make_factor
-from jrcjax.types import EVENT_MODELS
+from jrcjax.model.params import Factor
+from jrcjax.readings import EventModel
 from paper_figs.plots import curves
 from sweeps.__main__ import main
 from sweeps.engine.program import Points, points_of
@@ -49,7 +49,7 @@ def test_hyperparameters_and_readings_vary_and_others_are_set():
     points = points_of(sweep, "paper")
     np.testing.assert_allclose(points.hparams.discount, [0.0, 0.5])
     np.testing.assert_array_equal(points.hparams.target_period, 7)
-    np.testing.assert_array_equal(points.params.event_model, EVENT_MODELS.index("marginal"))
+    np.testing.assert_array_equal(points.params.event_model, EventModel.MARGINAL)
     own = custom_sweep(Options(vary="env.event_model=noisy_or,conditional"), "paper")
     assert own.sweep.x_values == (0.0, 2.0)
     assert points_of(own.sweep, "paper").params.event_model.dtype == np.int32
@@ -66,7 +66,7 @@ def test_densities_beyond_those_of_the_base_share_one_shape(environments, monkey
 
 
 def three_level_roads(params):
-    return params.replace(road=make_factor((0.5, 0.3, 0.2), (0.0, 0.1, 0.2)))
+    return params.replace(road=Factor(prior=(0.5, 0.3, 0.2), event_probability=(0.0, 0.1, 0.2)))
 
 
 def test_an_entry_of_a_distribution_takes_from_the_others_in_proportion(point):

@@ -59,17 +59,6 @@ def flipped(content: bytes, bit: int) -> bytes:
     return bytes(changed)
 
 
-def test_every_flipped_bit_and_every_lost_byte_is_seen(tmp_path):
-    content, path = bytes(range(40)), tmp_path / "file"
-    path.write_bytes(files.sealed(content))
-    assert files.unsealed(path) == content
-    whole = path.read_bytes()
-    for changed in [flipped(whole, i) for i in range(8 * len(whole))] + [whole[:n] for n in range(len(whole))]:
-        path.write_bytes(changed)
-        with pytest.raises(files.DamagedFile):
-            files.unsealed(path)
-
-
 DAMAGE = {
     "torn": lambda content, data: content[: len(content) // 2],
     "empty": lambda content, data: b"",
@@ -151,18 +140,88 @@ def test_the_manifest_is_made_from_the_parts(folder):
         assert json.loads(path.read_text()) == manifest
 
 
-@pytest.mark.parametrize("failing", ["mkstemp", "fsync"])
+def test_the_manifest_says_where_all_parts_come_from(folder):
+    part = store.part_path(folder, range(3))
+    data = parts.read_part(part)
+    provenance = json.loads(data.attrs["provenance"])
+    other = provenance | {"git_commit": "0" * 40, "versions": provenance["versions"] | {"jax": "0.0"}}
+    store.write_part(folder, range(3, 6), data.assign_coords(seed=[3, 4, 5]).assign_attrs(provenance=json.dumps(other)))
+    store.write_manifest(folder)
+    manifest = json.loads((folder / store.MANIFEST).read_text())
+    assert manifest["git_commit"] == [provenance["git_commit"], "0" * 40]
+    assert [versions["jax"] for versions in manifest["versions"]] == [provenance["versions"]["jax"], "0.0"]
+    assert manifest["machine"] == provenance["machine"]
+
+
+def test_a_digest_is_that_of_the_content(folder, capsys):
+    """A part that claims the digest of another one is no part."""
+    part = store.part_path(folder, range(3))
+    data = parts.read_part(part)
+    data["reward"][0, 0, 0, 0] += 1
+    part.write_bytes(files.sealed(bytes(data.to_netcdf(engine="h5netcdf"))))
+    assert parts.parts_of(folder) == []
+    assert (
+        "set aside as seeds-000000-000002.nc.damaged: its digest is not that of its content" in capsys.readouterr().err
+    )
+
+
+@pytest.mark.parametrize(
+    ("setting", "value"),
+    [
+        ("jax_threefry_partitionable", False),
+        ("jax_default_prng_impl", "rbg"),
+        ("jax_enable_x64", True),
+        ("jax_default_matmul_precision", "bfloat16"),
+    ],
+)
+def test_a_run_under_another_setting_of_jax_is_not_continued(setting, value, folder, untouched):
+    before = getattr(jax.config, setting)
+    jax.config.update(setting, value)
+    try:
+        field = setting.removeprefix("jax_")
+        with pytest.raises(store.ConfigurationMismatch, match=rf"numerics\.{field}: .* there, .* wanted"):
+            run_sweep(CHEAP, replace(SIZE, seeds=4), folder.parent, QUIET, resume=True)
+        with pytest.raises(store.ConfigurationMismatch, match=rf"numerics\.{field}: "):
+            verify(folder, None, {"cheap": CHEAP})
+    finally:
+        jax.config.update(setting, before)
+
+
+def test_the_digest_of_environments_tells_banks_apart():
+    params = run.points_of(CHEAP, "paper").params
+    other = jax.tree.map(lambda leaf: leaf + 0.5 if leaf is params.radar.miss_bank else leaf, params)
+    assert store.digest_of(params) != store.digest_of(other)
+
+
+@pytest.mark.parametrize("kind", ["pipe", "dangling", "loop"])
+def test_what_is_no_file_in_the_place_of_a_part_is_set_aside(kind, folder, capsys):
+    part = folder / "seeds-000005-000007.nc"
+    {
+        "pipe": lambda: os.mkfifo(part),
+        "dangling": lambda: part.symlink_to(folder / "absent"),
+        "loop": lambda: part.symlink_to(part),
+    }[kind]()
+    assert [found.seeds for found in parts.parts_of(folder)] == [range(3)]
+    assert f"{part} is set aside as {part.name}.damaged: it is a " in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("failing", ["open", "fsync"])
 def test_a_full_disk_is_told_and_leaves_what_was_there(failing, folder, untouched, monkeypatch):
     def full(*args, **kwargs):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     with monkeypatch.context() as patched:
-        patched.setattr(files.tempfile if failing == "mkstemp" else files.os, failing, full)
+        patched.setattr(files.os, failing, full if failing == "fsync" else full_for_parts(files.os.open, full))
         with pytest.raises(OSError, match=r"No space left on device: .*seeds-000003-000003\.nc was not written") as e:
             run_sweep(CHEAP, replace(SIZE, seeds=4), folder.parent, QUIET, resume=True)
         assert e.value.errno == errno.ENOSPC
     assert digests(folder) == digests(untouched)
     assert not list(folder.glob(".*.tmp"))
+
+
+def full_for_parts(opened, full):
+    """What opens files but for temporary ones."""
+    return lambda path, *args, **kwargs: (full if ".tmp" in str(path) else opened)(path, *args, **kwargs)
 
 
 def test_a_second_run_says_that_the_folder_is_in_use(folder):
@@ -172,24 +231,14 @@ def test_a_second_run_says_that_the_folder_is_in_use(folder):
     assert parts.finished_seeds(folder) == {0, 1, 2, 3}
 
 
-def test_a_killed_process_leaves_neither_lock_nor_temporary_files(tmp_path):
-    code = "import pathlib, sys, time; from jrcjax import files\nwith files.locked(pathlib.Path(sys.argv[1])): input()"
-    process = subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], cwd=ROOT, stdin=subprocess.PIPE)
-    while not (tmp_path / ".lock").exists() or not (tmp_path / ".lock").read_text():
-        time.sleep(0.05)
-    with pytest.raises(files.FolderInUse, match=f"process {process.pid} on "), files.locked(tmp_path):
-        pass
-    (tmp_path / ".left.tmp").write_bytes(b"half")
-    process.kill()
-    process.communicate()
-    with files.locked(tmp_path):
-        assert not (tmp_path / ".left.tmp").exists()
-
-
 def test_damaged_source_agents_are_trained_again(tmp_path, capsys):
     size = Size(seeds=2, episodes=1, pretraining=2, demonstrations=30)
     first = sources.sources_of(sources.SOURCE, size, range(2), tmp_path, lambda seconds: None)
-    part = store.part_path(tmp_path / "source", range(2))
+    part, manifest = store.part_path(tmp_path / "source", range(2)), tmp_path / "source" / store.MANIFEST
+    told = manifest.read_bytes()
+    manifest.unlink()  # as a process leaves it that is killed between a part and its manifest
+    sources.sources_of(sources.SOURCE, size, range(2), tmp_path, lambda seconds: None)
+    assert manifest.read_bytes() == told
     part.write_bytes(flipped(part.read_bytes(), 4321))
     again = sources.sources_of(sources.SOURCE, size, range(2), tmp_path, lambda seconds: None)
     assert "set aside" in capsys.readouterr().err

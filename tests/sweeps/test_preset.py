@@ -8,7 +8,7 @@ import pytest
 
 import jrcjax
 from jrcjax.config.toml import save_params
-from jrcjax.types import COUNTING_RULES, DISTANCES
+from jrcjax.readings import CountingRule, Distance
 from paper_figs.__main__ import main as figures_main
 from sweeps.__main__ import main as sweeps_main
 from sweeps.engine.program import points_of
@@ -88,7 +88,10 @@ def test_universes_take_the_sizes_from_the_file(traffic):
         radar = read_as(params, universe).radar
         assert float(radar.density) == 30.5
         np.testing.assert_array_equal(radar.size_mean, [[4.5, 2.0], [0.75, 0.5]])
-        assert (DISTANCES[int(radar.distance)], COUNTING_RULES[int(radar.counting_rule)]) == (distance, rule)
+        assert (Distance.names()[int(radar.distance)], CountingRule.names()[int(radar.counting_rule)]) == (
+            distance,
+            rule,
+        )
 
 
 @pytest.mark.slow

@@ -1,5 +1,10 @@
 """Agents in blocks on all devices give what a plain vmap gives."""
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -10,6 +15,7 @@ from jrcjax.learners.hparams import Config, HParams
 from jrcjax.training import parallel
 from jrcjax.training.rollout import init_agent, learner_for, run_episodes
 
+ROOT = Path(__file__).parents[2]
 UNIT = parallel.BLOCK * jax.device_count()
 CONFIG = Config(episodes=3, batch_size=8, replay_capacity=64, hidden=(8,), optimiser="sgd")
 
@@ -133,3 +139,88 @@ def test_a_slot_computes_the_network_once(name, blocks):
         if " dot(" in line and 'ColumnDense_1/dot_general"' in line and "transpose(" not in line
     ]
     assert forward.count(max(forward)) == 1
+
+
+# --- Commands in other people's environments --------------------------------------------------------------------------
+
+_LANES = """
+import jax
+from jrcjax.training import parallel
+jax.config.update("jax_num_cpu_devices", 8)
+double = parallel.over_agents(lambda shared, agent: 2 * agent)
+for count in (1, 10, 40, 100, 128, 129, 1000):
+    agents = jax.numpy.arange(parallel.padded(count))
+    doubled = double(0, agents)
+    assert (doubled == 2 * agents).all()
+    groups = parallel.groups(agents[:count])
+    assert sum(map(len, groups)) == len(agents), (count, [len(group) for group in groups])
+    print(count, len(agents), len(doubled.sharding.device_set))
+"""
+
+
+def run_python(code: str, *arguments: str, **environment: str) -> subprocess.CompletedProcess:
+    """Runs a program in this project, in an environment with other variables."""
+    command = [sys.executable, "-W", "error", "-c", code, *arguments]
+    return subprocess.run(command, cwd=ROOT, env=os.environ | environment, capture_output=True, text=True)
+
+
+def test_many_cores_do_no_more_than_is_asked():
+    done = run_python(_LANES, JAX_PLATFORMS="cpu")
+    assert done.stderr == ""
+    rows = [tuple(map(int, line.split())) for line in done.stdout.splitlines()]
+    assert rows == [(1, 32, 2), (10, 32, 2), (40, 48, 3), (100, 112, 7), (128, 128, 8), (129, 160, 5), (1000, 1024, 8)]
+
+
+_PINNED = """
+from jrcjax import numerics
+from jrcjax.training import parallel
+parallel.start()
+import jax
+numbers = jax.random.normal(jax.random.key(0), (3,)), jax.numpy.arange(2)
+print(numerics.in_force(), *(leaf.tolist() for leaf in numbers), *(leaf.dtype for leaf in numbers))
+"""
+OTHERS = {
+    "JAX_THREEFRY_PARTITIONABLE": "0",
+    "JAX_DEFAULT_PRNG_IMPL": "rbg",
+    "JAX_ENABLE_X64": "1",
+    "JAX_DEFAULT_MATMUL_PRECISION": "bfloat16",
+    "JAX_RANDOM_SEED_OFFSET": "3",
+}
+
+
+def test_commands_draw_the_same_numbers_whatever_a_users_variables_say():
+    plain, other = run_python(_PINNED), run_python(_PINNED, **OTHERS)
+    assert plain.returncode == 0, plain.stderr
+    assert (plain.stdout, plain.stderr) == (other.stdout, other.stderr)
+
+
+def test_a_platform_that_is_not_there_is_one_line():
+    code = "from jrcjax.training import parallel; parallel.start()"
+    done = run_python(code, JAX_PLATFORMS="nonsense")
+    assert "ValueError: JAX_PLATFORMS: 'nonsense'; allowed: cpu, or a platform that works here" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("flag", "known"),
+    [
+        (("--xla_cpu_prefer_vector_width", "512"), True),
+        (("--xla_backend_extra_options", "-unroll-full-max-count=8,xla_cpu_use_multi_output_fusion=true"), True),
+        (("--xla_cpu_no_such_flag", "1"), False),
+        (("--xla_backend_extra_options", "-no-such-option=8"), False),
+    ],
+)
+def test_flags_that_this_jaxlib_does_not_know_are_left_out(flag, known, monkeypatch):
+    monkeypatch.setattr(parallel, "_XLA_FLAGS", dict([flag]))
+    monkeypatch.setenv("XLA_FLAGS", "")
+    monkeypatch.setattr(parallel.jax.config, "update", lambda *args: None)
+    parallel.use_all_cores()
+    assert os.environ["XLA_FLAGS"] == ("=".join(flag) if known else "")
+
+
+def test_a_user_without_a_home_keeps_nothing_compiled():
+    code = "import os, jax; from jrcjax.training import parallel; parallel.keep_compiled()"
+    code += "; print(jax.config.jax_compilation_cache_dir)"
+    nobody = "import os; [os.environ.pop(name, 0) for name in ('HOME', 'XDG_CACHE_HOME', 'JAX_COMPILATION_CACHE_DIR')]"
+    no_entry = "import pwd; pwd.getpwuid = lambda uid: {}[uid]"
+    done = run_python(f"{nobody}; {no_entry}; {code}")
+    assert (done.returncode, done.stdout.strip()) == (0, "None"), done.stderr

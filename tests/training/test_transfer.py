@@ -16,7 +16,7 @@ import jrcjax
 from jrcjax.checks import require_keys
 from jrcjax.learners import LEARNERS, Learner, Source, Spec
 from jrcjax.learners.hparams import Config, HParams
-from jrcjax.model.params import make_factor
+from jrcjax.model.params import Factor
 from jrcjax.training import rollout
 from jrcjax.training.source import demonstrate
 from jrcjax.training.transfer import TARGET_LEARNERS, Transfer, target_key
@@ -295,7 +295,7 @@ def test_one_source_for_each_key(agents, params):
 
 
 def with_three_roads(params):
-    return params.replace(road=make_factor((0.2, 0.3, 0.5), (0.1, 0.2, 0.3)))
+    return params.replace(road=Factor(prior=(0.2, 0.3, 0.5), event_probability=(0.1, 0.2, 0.3)))
 
 
 @pytest.mark.usefixtures("nothing_runs")

@@ -1,4 +1,7 @@
-"""The environment in other libraries' shapes, checked by those libraries where they are installed."""
+"""The environment in gymnax' shape and the older one of five values, with the clients that want them.
+
+Clients are looked for in each test, since some of it needs none.
+"""
 
 import inspect
 import subprocess
@@ -10,9 +13,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from tiny import tiny_params
 
 import jrcjax
+import jrcjax.adapters
 from jrcjax.adapters import FiveTupleEnv
 
 ROOT = Path(__file__).parents[2]
@@ -37,20 +40,6 @@ def test_five_tuple_is_the_environment_with_one_flag(terminal):
         flags.append(bool(got[3]))
         state = got[1]
     assert flags == [False, False, True, False, False, True, False]
-
-
-def gymnasium_env(**settings):
-    pytest.importorskip("gymnasium", reason="needs the extra 'clients'")
-    from jrcjax.adapters import GymnasiumEnv
-
-    return GymnasiumEnv(**settings)
-
-
-def registered(environment, **settings):
-    gymnasium = pytest.importorskip("gymnasium", reason="needs the extra 'clients'")
-    import jrcjax.adapters  # noqa: F401 - registers the environments
-
-    return gymnasium.make(f"jrcjax/JRC-{environment}-v0", **settings)
 
 
 def test_importing_the_adapters_needs_no_client():
@@ -82,102 +71,6 @@ def test_importing_the_adapters_needs_no_client():
 def test_an_unknown_adapter_is_an_attribute_error():
     with pytest.raises(AttributeError, match="JaxMarlEnv"):
         _ = jrcjax.adapters.JaxMarlEnv
-
-
-# Warnings are errors here, and the checkers warn of what they find odd.
-@pytest.mark.parametrize("environment", ["source", "target"])
-def test_gymnasium_check_env_of_the_registered(environment):
-    env = registered(environment)
-    from gymnasium.utils.env_checker import check_env
-
-    check_env(env.unwrapped)  # its spec lets it try every render mode
-
-
-def test_stable_baselines3_check_env():
-    env = gymnasium_env(render_mode="rgb_array")
-    pytest.importorskip("stable_baselines3", reason="needs the extra 'clients'")
-    from stable_baselines3.common.env_checker import check_env
-
-    check_env(env)
-
-
-def test_registered_environments_are_the_papers():
-    for environment in ("source", "target"):
-        made, direct = registered(environment), gymnasium_env(params=jrcjax.paper_params(environment))
-        np.testing.assert_array_equal(made.reset(seed=4)[0], direct.reset(seed=4)[0])
-        for action in (0, 1, 2, 3) * 5:
-            one, other = made.step(action), direct.step(action)
-            np.testing.assert_array_equal(one[0], other[0])
-            assert one[1:] == other[1:]
-
-
-def test_registered_environment_takes_a_preset():
-    with pytest.raises(ValueError, match="preset: 'town' is unknown"):
-        registered("target", preset="town")
-
-
-def test_registered_episode_ends_at_the_time_limit():
-    env = registered("target")
-    env.reset(seed=0)
-    ends = [env.step(3)[2:4] for _ in range(300)]
-    assert ends == [(False, False)] * 299 + [(False, True)]
-
-
-def test_gymnasium_renders_the_slot_that_it_ran():
-    env = gymnasium_env(params=tiny_params(), render_mode="rgb_array")
-    env.reset(seed=1)
-    first = env.render()
-    pictures = []
-    for action in (0, 4):
-        env.step(action)
-        pictures.append(env.render())
-    assert all(p.dtype == np.uint8 and p.shape == first.shape for p in pictures)
-    assert not np.array_equal(first, pictures[0])
-    assert not np.array_equal(pictures[0], pictures[1])
-    np.testing.assert_array_equal(pictures[1], env.render())
-    env.reset(seed=1)
-    np.testing.assert_array_equal(env.render(), first)
-
-
-def test_gymnasium_draws_nothing_without_a_render_mode():
-    env = gymnasium_env()
-    env.reset(seed=1)
-    assert env.render() is None
-    with pytest.raises(ValueError, match="render_mode: 'human'; allowed: None, 'rgb_array'"):
-        gymnasium_env(render_mode="human")
-
-
-def test_gymnasium_episode():
-    env = gymnasium_env(params=PARAMS.replace(max_steps_in_episode=5), seed=3)
-    first = env.reset()[0]
-    steps = [env.step(i % 4) for i in range(5)]
-    assert [step[3] for step in steps] == [False] * 4 + [True]
-    assert not any(step[2] for step in steps)
-    assert all(env.observation_space.contains(step[0]) for step in steps)
-    again = gymnasium_env(params=PARAMS.replace(max_steps_in_episode=5), seed=3)
-    np.testing.assert_array_equal(again.reset()[0], first)
-    for i, step in enumerate(steps):
-        obs, *rest = again.step(i % 4)
-        np.testing.assert_array_equal(obs, step[0])
-        assert rest == list(step[1:])
-    with pytest.raises(ValueError, match="action: 4; allowed: an integer from 0 to 3"):
-        env.step(4)
-
-
-def test_gymnasium_rewards_have_the_exact_mean():
-    """One action in all slots: the mean reward against the solver's, within four standard errors of batches."""
-    env = gymnasium_env(seed=0)
-    policy = jnp.zeros((PARAMS.num_states, 4)).at[:, 3].set(1.0)
-    wanted = float(jrcjax.exact.evaluate_policy(PARAMS, policy).reward)
-    env.reset()
-    rewards = []
-    for _ in range(9000):
-        _, reward, _, truncated, _ = env.step(3)
-        rewards.append(reward)
-        if truncated:
-            env.reset()
-    batches = np.reshape(rewards, (30, 300)).mean(axis=1)
-    assert abs(batches.mean() - wanted) < 4 * batches.std(ddof=1) / np.sqrt(30)
 
 
 class Wrapper:
@@ -253,9 +146,13 @@ def test_gymnax_contract():
     from gymnax.environments.environment import Environment
 
     params, key = PARAMS.replace(max_steps_in_episode=3), jax.random.key(0)
+    assert isinstance(env, Environment)
     assert isinstance(env.name, str)
     assert env.num_actions == env.action_space(params).n == 4
-    names = ("reset", "step", "reset_env", "step_env", "action_space", "observation_space", "is_truncated")
+    names = (
+        "reset", "step", "reset_env", "step_env", "action_space", "observation_space", "state_space", "observe",
+        "get_obs", "is_truncated", "is_terminated", "is_terminal", "discount",
+    )  # fmt: skip
     for name in names:
         theirs, ours = (inspect.signature(getattr(kind, name)) for kind in (Environment, type(env)))
         assert list(ours.parameters) == list(theirs.parameters), name
@@ -268,6 +165,35 @@ def test_gymnax_contract():
         jax.tree.map(np.testing.assert_array_equal, ours, theirs)
         assert env.observation_space(params).contains(ours[0])
         state = ours[1]
+
+
+@pytest.mark.parametrize("terminal", [0, 1])
+def test_gymnax_ends_of_episodes(terminal):
+    env = contract_env()
+    params = PARAMS.replace(max_steps_in_episode=3, terminal_time_limit=jnp.int32(terminal))
+    for time in range(4):
+        state = jrcjax.EnvState(jnp.int32(7), jnp.int32(time))
+        ends = bool(terminal) and time == 3
+        assert bool(env.is_terminated(state, params)) == bool(env.is_terminal(state, params)) == ends
+        assert bool(env.is_truncated(state, params)) == (not terminal and time == 3)
+        assert float(env.discount(state, params)) == (0.0 if ends else 1.0)
+        np.testing.assert_array_equal(env.observe(jax.random.key(0), state, 1, params), env.get_obs(state, params))
+        assert env.state_space(params).contains(state)
+    assert env.state_space(params).spaces["id"].n == params.num_states
+    assert not env.supports_transition_gradients
+
+
+def test_gymnax_older_interface_by_its_own_wrapper():
+    gymnax()
+    from gymnax.wrappers.compat import LegacyStepAPIWrapper
+
+    params = PARAMS.replace(max_steps_in_episode=2)
+    theirs, ours = LegacyStepAPIWrapper(contract_env()), FiveTupleEnv()
+    _, state = ours.reset(jax.random.key(0), params)
+    for i in range(3):
+        one, other = (env.step(jax.random.key(i), state, i, params) for env in (theirs, ours))
+        jax.tree.map(np.testing.assert_array_equal, one[:4], other[:4])
+        state = other[1]
 
 
 def env_like(env):

@@ -1,0 +1,65 @@
+"""Readings: how the paper may be understood where it is silent or contradicts itself.
+
+Each class is one decision and each member one reading of it; the first is the default. Parameters hold the reading's
+number, so that a reading can be traced and vmapped over, and people may give its name in lower case.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class Reading(IntEnum):
+    """One decision that the paper leaves open."""
+
+    @classmethod
+    def names(cls) -> tuple[str, ...]:
+        """The readings as people write them, in the order of their numbers."""
+        return tuple(member.name.lower() for member in cls)
+
+
+class EventModel(Reading):
+    """How the factors' probabilities add up to that of an unexpected event, equation (4)."""
+
+    CONDITIONAL = 0
+    """The sum over factors of p at the factor's current level, clipped to 1."""
+    MARGINAL = 1
+    """Equation (4) as printed: the sum over factors of the mean of p over the factor's prior."""
+    NOISY_OR = 2
+    """1 - product over factors of (1 - p), p at the factor's current level."""
+
+
+class MissConvention(Reading):
+    """Which slots count for the probability of miss detection, equation (7). A slot spent on data misses all."""
+
+    ALL_SLOTS = 0
+    EVENT_SLOTS = 1
+    RADAR_SLOTS = 2
+
+
+class Distance(Reading):
+    """The distance between two objects that is compared with the range resolution."""
+
+    FOOTPRINT_GAP = 0
+    """Between their axis-aligned footprints."""
+    CENTRE_TO_CENTRE = 1
+    RADIAL_RANGE = 2
+    """The difference of their distances from the vehicle."""
+
+
+class CountingRule(Reading):
+    """Which objects count as detected."""
+
+    RESOLVED = 0
+    """Those that are resolved from all others."""
+    CLUSTERS = 1
+    """Every cluster of merged objects, once."""
+
+
+class CountModel(Reading):
+    """How many objects a placement has, given their mean number."""
+
+    FIXED = 0
+    """The mean, rounded."""
+    POISSON = 1
+    """A Poisson number with that mean."""
