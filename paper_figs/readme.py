@@ -22,8 +22,8 @@ from paper_figs.claims.judge import VERDICTS, Judgement, from_json
 from paper_figs.claims.learning_table import LABELS
 from paper_figs.claims.table import TITLES, number_of
 
-FIGURES, ROBUSTNESS = "figures", "robustness"
-"""Folders of published results: those of `make figures`, and those of the robustness study."""
+FIGURES, ROBUSTNESS, CALIBRATION = "figures", "robustness", "calibration"
+"""Folders of published results: of `make figures`, of the robustness study, and of `paper_figs.calibration`."""
 _BEGIN = "<!-- made by python -m paper_figs.publish: {name} -->"
 _END = "<!-- end of {name} -->"
 _ANY = re.compile(r"<!-- made by python -m paper_figs\.publish: (\S+) -->\n(.*?)<!-- end of \1 -->", re.DOTALL)
@@ -237,6 +237,30 @@ def robustness_list(published: Path) -> str:
     )
 
 
+def calibration_list(published: Path) -> str:
+    """How frequent false verdicts are in simulated studies, and where they are more frequent than they should be."""
+    rows = pd.read_csv(published / CALIBRATION / "calibration.csv", keep_default_na=False).query("what != 'verdicts'")
+    rows = rows.assign(false=rows[["false_supported", "false_contradicted"]].max(axis=1))
+    inside, wide, beyond = (
+        rows.query("out_of_reach == 0"),
+        rows.query("what == 'coverage'"),
+        rows.query("what == 'errors'"),
+    )
+    sentences = [
+        f"In {len(inside)} of {len(rows)} rows (a rule, a world, a number of seeds) false verdicts of a kind come in "
+        f"at most {_percent(inside.false.max())} of studies, and intervals hold the truth in "
+        f"{_percent(inside.coverage.min())} to {_percent(inside.coverage.max())}.",
+        f"In {len(wide)} rows intervals are wider than they need be; false verdicts come in at most "
+        f"{_percent(wide.false.max())}.",
+    ]
+    for rule, world in dict.fromkeys(zip(beyond.rule, beyond.world, strict=True)):
+        here = beyond[(beyond.rule == rule) & (beyond.world == world)]
+        worst = ", ".join(f"{n} seeds {_percent(false)}" for n, false in zip(here.n_seeds, here.false, strict=True))
+        since = f"in reach from {here.in_reach_from.iloc[0]} seeds"
+        sentences.append(f"Out of reach: {rule}, {world}: {worst}; {here.reason.iloc[0]}; {since}.")
+    return _listed(sentences)
+
+
 BLOCKS: dict[str, Callable[[Path], str]] = {
     "headline": headline,
     "verdicts": verdicts_table,
@@ -249,5 +273,6 @@ BLOCKS: dict[str, Callable[[Path], str]] = {
     "target": target_list,
     **{figure: functools.partial(points_list, figure) for figure in ("fig6", "fig7", "fig8")},
     "robustness": robustness_list,
+    "calibration": calibration_list,
 }
 """Name of a marked part to what makes it from the folder of published results."""
