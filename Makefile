@@ -8,9 +8,10 @@ VENV := .venv
 PY := $(VENV)/bin/python
 STAMP := $(VENV)/.stamp
 PEERS_STAMP := $(VENV)/.peers
+DOCS_STAMP := $(VENV)/.docs
 
 .DEFAULT_GOAL := help
-.PHONY: setup figures test bench peers sweeps lint types lock-check lock clean help
+.PHONY: setup figures test bench peers sweeps docs explore lint types lock-check lock clean help
 
 setup: $(STAMP)  ## make .venv with the locked packages and this project
 
@@ -65,6 +66,21 @@ $(PEERS_STAMP): $(STAMP)
 sweeps: $(STAMP)  ## run parameter sweeps
 	$(PY) -m sweeps $(ARGS)
 
+docs: $(STAMP) $(DOCS_STAMP)  ## build the documentation into site/
+	NO_MKDOCS_2_WARNING=1 $(PY) -m mkdocs build --quiet --strict --clean --site-dir site
+
+$(DOCS_STAMP): $(STAMP)
+	@echo "installing what builds the documentation into $(VENV)"
+	@set -e; \
+	sed -e '/^ *--hash/d' -e 's/ *\\$$//' requirements.lock > $(VENV)/constraints.txt; \
+	$(PY) -m pip --version >/dev/null 2>&1 || $(PY) -m ensurepip >/dev/null; \
+	$(PY) -m pip install --disable-pip-version-check --quiet --no-compile --constraint $(VENV)/constraints.txt \
+	  --no-build-isolation --editable '.[docs]'
+	@touch $@
+
+explore: $(STAMP)  ## open the explorer in a browser
+	$(PY) -m explorer $(ARGS)
+
 lint: $(STAMP)  ## check style
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check --quiet .
@@ -83,7 +99,7 @@ lock:  ## renew requirements.lock (needs uv; UPGRADE=--upgrade for newer version
 	  --extra studies --extra dev pyproject.toml -o requirements.lock
 
 clean:  ## remove the environment and everything else that was built
-	rm -rf $(VENV) build dist .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) build dist site .pytest_cache .ruff_cache .hypothesis
 	find . -name .git -prune -o -type d -name __pycache__ -exec rm -rf {} +
 
 help:  ## list the targets

@@ -13,6 +13,7 @@ from jrcjax.learners.hparams import Config, HParams
 from jrcjax.model.environment import EnvState, JRCEnv
 from jrcjax.model.params import EnvParams, check_params
 from jrcjax.model.presets import paper_params
+from jrcjax.training.chunks import train_in_chunks
 from jrcjax.training.rollout import AgentState, Log
 from jrcjax.training.source import train_source
 from jrcjax.training.train import train, train_agents
@@ -23,5 +24,6 @@ __version__ = "0.1.0"
 __all__ = [
     "AgentState", "Config", "EnvParams", "EnvState", "Evaluation", "HParams", "JRCEnv", "Log", "SavedAgent", "Source",
     "Transfer", "check_params", "events", "exact", "front", "load_agent", "load_params", "paper_params", "radar",
-    "save_agent", "save_agents", "save_params", "train", "train_agents", "train_source", "transfer",
+    "save_agent", "save_agents", "save_params", "train", "train_agents", "train_in_chunks",
+    "train_source", "transfer",
 ]  # fmt: skip

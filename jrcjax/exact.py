@@ -19,10 +19,12 @@ from jrcjax.model.params import EnvParams, of_params
 from jrcjax.model.rewards import reward
 from jrcjax.policies import greedy_policy
 from jrcjax.radar.bank import mean_miss_ratio
+from jrcjax.readings import RewardState
 from jrcjax.types import Float, Int
 
 __all__ = [
     "LongRun",
+    "as_observed",
     "best_constant_action",
     "evaluate_policy",
     "expected_reward",
@@ -33,6 +35,7 @@ __all__ = [
     "optimal_policy",
     "packet_table",
     "policy_of_actions",
+    "slot_reward",
     "state_transition",
     "stationary_distribution",
     "transition_tensor",
@@ -99,9 +102,52 @@ def _is_data(params: EnvParams) -> jax.Array:
     return jnp.arange(params.num_actions) < params.num_rates
 
 
+def _episode_mean(table: Float, params: EnvParams) -> Float:
+    """(1/T) sum over t < T of P^t table, [S, A]: the mean over the T slots of an episode.
+
+    P is the product of one matrix per factor, Q + kappa (I - Q), where Q averages over the factor's prior. With
+    x = Q x + (I - Q) x for every factor in turn, a table falls into parts that P^t multiplies by a number: the product
+    of the kappas of the factors whose second term it took, to the power t.
+    """
+    slots = params.max_steps_in_episode
+
+    def mean_of(part: Float, rate: Float | None, axis: int) -> Float:
+        if axis == len(params.factors):
+            return part if rate is None else part * (1.0 - rate**slots) / (slots * (1.0 - rate))
+        factor = params.factors[axis]
+        weights = jnp.expand_dims(factor.prior, [i for i in range(part.ndim) if i != axis])
+        mean = (weights * part).sum(axis=axis, keepdims=True)
+        slower = factor.persistence if rate is None else rate * factor.persistence
+        return mean_of(mean, rate, axis + 1) + mean_of(part - mean, slower, axis + 1)
+
+    mean = mean_of(table.reshape(*params.shape, -1), None, 0)
+    return mean.reshape(table.shape)
+
+
+@of_params
+def as_observed(params: EnvParams, table: Float) -> Float:
+    """The mean of a table [S, A] of what slots give, over the slots in which the agent observes each state; [S, A].
+
+    Under `reward_state` "current" that is the table itself. Under "episode_start" a slot gives what the episode's first
+    state has in the table. The factors' chains are reversible, so seen from a state observed at time t the first state
+    is distributed as the state t slots later, and the mean is over the slots of an episode.
+    """
+    is_first = params.reward_state == RewardState.EPISODE_START
+    return jnp.where(is_first, _episode_mean(table, params), table)
+
+
 @of_params
 def expected_reward(params: EnvParams) -> Float:
-    """E[rho | s, a], [S, A]; equation (11) averaged over event and placement, in both of which it is linear."""
+    """E[rho | s, a] in the slots in which an agent observes s, [S, A]; see `as_observed`."""
+    return as_observed(params, slot_reward(params))
+
+
+@of_params
+def slot_reward(params: EnvParams) -> Float:
+    """E[rho | s, a] of a slot whose event and packets belong to s, [S, A].
+
+    Equation (11) averaged over event and placement, in both of which it is linear.
+    """
     p = event_probability(params)[:, None]
     is_data, packets, miss = _is_data(params)[None], packet_table(params), miss_table(params)[None]
     given = [reward(is_data, jnp.bool_(e), packets, miss, params.reward_weights) for e in (True, False)]
@@ -123,6 +169,10 @@ def largest_reward(params: EnvParams) -> Float:
 @of_params
 def value_iteration(params: EnvParams, gamma: Float | float = 0.99, tolerance: float = 1e-4) -> Float:
     """Q* of the discounted problem, [S, A].
+
+    Under `reward_state` "episode_start" what an agent observes is no Markov state. Q* then belongs to the problem in
+    which each observed state earns its mean (`expected_reward`). Its greedy policy earns the most of all policies that
+    look at the observed state alone, since actions have no influence on it; a memory of the first allows more.
 
     Relative value iteration with MacQueen's bounds: after each sweep the optimal values lie within gamma / (1 - gamma)
     times the smallest and largest change, so it stops when these bounds are `tolerance` apart and takes their middle.
@@ -194,6 +244,9 @@ def _is_policy(policy: np.ndarray) -> bool:
 def evaluate_policy(params: EnvParams, policy: Float) -> LongRun:
     """Long-run reward, throughput and miss detection per slot of a stationary policy.
 
+    Under `reward_state` "episode_start" they are the means over the slots of many episodes: the first state of each is
+    drawn from the priors, as the simulator draws it, and stays responsible for all of its slots.
+
     Args:
       params: the environment.
       policy: [S, A] probability of each action in each state.
@@ -203,7 +256,8 @@ def evaluate_policy(params: EnvParams, policy: Float) -> LongRun:
     """
     shape = (params.num_states, params.num_actions)
     require("policy", policy, shape, _is_policy, "probabilities in [0, 1] whose rows sum to 1")
-    visits = stationary_distribution(params)[:, None] * policy
+    # How often an action is taken while each state decides what it gives.
+    visits = stationary_distribution(params)[:, None] * as_observed(params, policy)
     p = event_probability(params)[:, None]
     packets, miss, is_data = packet_table(params), miss_table(params)[None], _is_data(params)[None]
     throughput, missed, counted = jnp.float32(0.0), jnp.float32(0.0), jnp.float32(0.0)
@@ -213,4 +267,4 @@ def evaluate_policy(params: EnvParams, policy: Float) -> LongRun:
         counts = jnp.where(metrics.counts_for_miss(is_data, event, params.miss_convention), weight, 0.0)
         missed, counted = missed + (counts * miss).sum(), counted + counts.sum()
     sums = metrics.zero()._replace(missed=missed, counted=counted)
-    return LongRun((visits * expected_reward(params)).sum(), throughput, metrics.miss_detection(sums))
+    return LongRun((visits * slot_reward(params)).sum(), throughput, metrics.miss_detection(sums))

@@ -16,7 +16,7 @@ import jax
 import jax.numpy as jnp
 
 from jrcjax.checks import is_not_negative, require
-from jrcjax.exact import miss_table, packet_table, policy_of_actions, stationary_distribution
+from jrcjax.exact import as_observed, miss_table, packet_table, policy_of_actions, stationary_distribution
 from jrcjax.model import metrics
 from jrcjax.model.events import event_probability
 from jrcjax.model.params import EnvParams, of_params
@@ -46,11 +46,12 @@ def contributions(params: EnvParams) -> tuple[Float, Float]:
     is_data = (jnp.arange(params.num_actions) < params.num_rates)[None]
     sent, missed, counted = jnp.zeros_like(packets), jnp.zeros_like(packets), jnp.float32(0.0)
     for event, chance in ((jnp.bool_(True), p), (jnp.bool_(False), 1.0 - p)):
-        weight = jnp.broadcast_to(visits * chance, packets.shape)
-        sent += weight * metrics.counted_packets(packets, event, params.count_event_packets)
-        counts = jnp.where(metrics.counts_for_miss(is_data, event, params.miss_convention), weight, 0.0)
+        chances = jnp.broadcast_to(chance, packets.shape)
+        sent += chances * metrics.counted_packets(packets, event, params.count_event_packets)
+        counts = jnp.where(metrics.counts_for_miss(is_data, event, params.miss_convention), chances, 0.0)
         missed += counts * miss
-        counted += counts[:, 0].sum()  # of data; the same for radar under all conventions but the last
+        counted += (visits * counts)[:, 0].sum()  # of data; the same for radar under all conventions but the last
+    sent, missed = (visits * as_observed(params, table) for table in (sent, missed))
     has_trade_off = params.miss_convention != MissConvention.RADAR_SLOTS
     return sent, jnp.where(has_trade_off, missed / counted, jnp.nan)
 

@@ -63,3 +63,12 @@ class CountModel(Reading):
     """The mean, rounded."""
     POISSON = 1
     """A Poisson number with that mean."""
+
+
+class RewardState(Reading):
+    """Which state a slot's event, packets and reward belong to."""
+
+    CURRENT = 0
+    """The one that the agent observes."""
+    EPISODE_START = 1
+    """The episode's first, although what the agent observes goes on changing; so in the authors' earlier code."""

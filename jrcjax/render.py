@@ -70,11 +70,14 @@ def slot_figure(key: Key, state: EnvState | Int | int, action: Int | int, params
         allowed = f"an integer from 0 to {count - 1}"
         require(name, value, (), lambda x, count=count: (x >= 0) & (x < count), allowed, kinds="iu")
     words = jax.random.bits(key, (slot.NUM_WORDS,), jnp.uint32)
-    return figure_of_words(words, int(state_id), int(action), params)
+    first = int(state.first) if isinstance(state, EnvState) else None
+    return figure_of_words(words, int(state_id), int(action), params, first)
 
 
-def figure_of_words(words: Words | np.ndarray | None, state: int, action: int | None, params: EnvParams) -> Figure:
-    """A picture of one slot, given the random words [NUM_WORDS] that `slot.run_slot` takes.
+def figure_of_words(
+    words: Words | np.ndarray | None, state: int, action: int | None, params: EnvParams, first: int | None = None
+) -> Figure:
+    """A picture of one slot, given what `slot.run_slot` takes: random words [NUM_WORDS], ids, and the first state's id.
 
     Without words and action it shows the state alone, before the first slot of an episode.
     """
@@ -82,7 +85,8 @@ def figure_of_words(words: Words | np.ndarray | None, state: int, action: int | 
     left, right = figure.subplots(1, 2, width_ratios=(1.45, 1))
     outcome = scene = None
     if words is not None and action is not None:
-        outcome = _run_slot(jnp.asarray(words), jnp.int32(state), jnp.int32(action), params)
+        deciding = jnp.int32(state if first is None else first)
+        outcome = _run_slot(jnp.asarray(words), jnp.int32(state), jnp.int32(action), params, deciding)
         mode = action - params.num_rates
         # A slot spent on data looks at nothing; the shortest range then shows what is near.
         scene = scene_of(words[-1], mode if mode >= 0 else _shortest(params), params)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import tyro
 
+from paper_figs.claims.delta import Delta
 from sweeps import interrupts
 from sweeps.command import begin
 from sweeps.options import FLAGS, Count, Counts, Folder, Preset
@@ -32,6 +33,8 @@ class Options:
     preset: Preset = "paper"
     """The paper's parameters: paper, paper_table, or a TOML file of what differs from them, such as one from
     jrcjax.config.nuscenes."""
+    delta: Delta = field(default_factory=Delta)
+    """Which differences between learners are negligible."""
 
 
 def main(args: list[str] | None = None) -> int:
@@ -44,7 +47,7 @@ def main(args: list[str] | None = None) -> int:
         with interrupts.terminable():
             from paper_figs.pipeline import make_figures
 
-            written = make_figures(options.only, size, out, console)
+            written = make_figures(options.only, size, out, console, options.delta)
     except KeyboardInterrupt:
         print(interrupts.how_to_go_on(), file=sys.stderr)
         return interrupts.STATUS

@@ -8,18 +8,22 @@ from pathlib import Path
 
 import pandas as pd
 import xarray as xr
+from matplotlib.figure import Figure
 from rich.console import Console
 
 from jrcjax.files import write_text
 from paper_figs import report
-from paper_figs.analysis import divergence, ranking, regret
+from paper_figs.analysis import divergence, front, ranking, regret
+from paper_figs.claims.delta import Delta
 from paper_figs.claims.judge import Judgement, as_json
+from paper_figs.claims.results import Rules
 from paper_figs.claims.table import claims_of
 from paper_figs.figures import FIGURES, NUMBERS, PaperFigure
+from paper_figs.plots import front as front_plot
 from paper_figs.plots import style
 from sweeps.engine.estimate import in_words
 from sweeps.engine.run import expected_seconds, run_sweep
-from sweeps.preset import label_of, slots_of
+from sweeps.preset import environment_of, label_of, slots_of
 from sweeps.results import store
 from sweeps.studies.registry import SWEEPS
 from sweeps.sweep import Size
@@ -51,14 +55,18 @@ class _Written:
     manifests: dict[str, str] = field(default_factory=dict)
 
 
-def make_figures(numbers: tuple[int, ...], size: Size, out: Path, console: Console) -> list[Path]:
+def make_figures(
+    numbers: tuple[int, ...], size: Size, out: Path, console: Console, delta: Delta | None = None
+) -> list[Path]:
     """Runs the sweeps that are missing, then writes all files of the figures with these numbers.
 
     Raises:
-      ValueError: unknown figures, bad sizes, or results of another configuration in `out`.
+      ValueError: unknown figures, bad sizes, a bad delta, or results of another configuration in `out`.
     """
     wanted = chosen(numbers)
     size.check()
+    rules = Rules(delta=delta or Delta())
+    rules.delta.check()
     out.mkdir(parents=True, exist_ok=True)
     folder = results_folder(out, size)
     seconds = expected_seconds([SWEEPS[figure.name] for figure in wanted], size, folder)
@@ -71,17 +79,29 @@ def make_figures(numbers: tuple[int, ...], size: Size, out: Path, console: Conso
         results[figure.name] = store.load(found, size.seeds)
         _write_figure(figure, results[figure.name], slots, out, written)
         written.manifests[figure.name] = (found / store.MANIFEST).read_text(encoding="utf-8")
+    if "fig5b" in results:
+        _write_front(results["fig5b"], size, out, written)
     _write_tables(results, slots, out, written)
-    _write_verdicts(results, size, out, written)
+    _write_verdicts(results, rules, size, out, written)
     return written.files
 
 
 def _write_figure(figure: PaperFigure, data: xr.Dataset, slots: int, out: Path, written: _Written) -> None:
     table = figure.table(data, slots)
-    path = style.save_table(table, out / f"{figure.name}.csv")
-    files = style.save(figure.draw(table, figure.title), out / figure.name)
+    _write(table, figure.draw(table, figure.title), figure.name, figure.title, out, written)
+
+
+def _write_front(data: xr.Dataset, size: Size, out: Path, written: _Written) -> None:
+    """What policies can reach in the target, with its learners; no figure of the paper."""
+    table = front.table(environment_of("target", size.preset), data)
+    _write(table, front_plot.draw(table, front.TITLE), front.NAME, front.TITLE, out, written)
+
+
+def _write(table: pd.DataFrame, picture: Figure, name: str, title: str, out: Path, written: _Written) -> None:
+    path = style.save_table(table, out / f"{name}.csv")
+    files = style.save(picture, out / name)
     written.files += [path, *files]
-    written.pictures[figure.title] = files[-1]
+    written.pictures[title] = files[-1]
 
 
 def _write_tables(results: dict[str, xr.Dataset], slots: int, out: Path, written: _Written) -> None:
@@ -93,13 +113,13 @@ def _write_tables(results: dict[str, xr.Dataset], slots: int, out: Path, written
         written.files.append(style.save_table(pd.concat(parts), out / f"{name}.csv"))
 
 
-def judgements_of(results: dict[str, xr.Dataset]) -> list[Judgement]:
+def judgements_of(results: dict[str, xr.Dataset], rules: Rules | None = None) -> list[Judgement]:
     """The judgements of all claims that rest on figures that were made."""
-    return [judgement for judgement in claims_of(results) if judgement.n_seeds]
+    return [judgement for judgement in claims_of(results, rules) if judgement.n_seeds]
 
 
-def _write_verdicts(results: dict[str, xr.Dataset], size: Size, out: Path, written: _Written) -> None:
-    judgements = judgements_of(results)
+def _write_verdicts(results: dict[str, xr.Dataset], rules: Rules, size: Size, out: Path, written: _Written) -> None:
+    judgements = judgements_of(results, rules)
     optima = [row for name, data in results.items() for row in report.optimum_rows(name, data)]
     diverged = [row for name, data in results.items() for row in divergence.rows(name, data)]
     page = report.render(size, written.pictures, judgements, optima, diverged, written.manifests)

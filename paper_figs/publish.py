@@ -16,6 +16,7 @@ from pathlib import Path
 import tyro
 
 from jrcjax.files import write_text
+from paper_figs.analysis import front
 from paper_figs.figures import FIGURES
 from paper_figs.numbers import numbers_of
 from paper_figs.pipeline import results_folder
@@ -62,7 +63,8 @@ def publish_figures(out: Path, target: Path) -> list[Path]:
     target.mkdir(parents=True, exist_ok=True)
     folder = results_folder(out, Size())
     copies = [out / name for name in TABLES]
-    copies += [out / f"{figure.name}{suffix}" for figure in FIGURES for suffix in (".pdf", ".png", ".csv")]
+    names = (*(figure.name for figure in FIGURES), front.NAME)
+    copies += [out / f"{name}{suffix}" for name in names for suffix in (".pdf", ".png", ".csv")]
     written = [Path(shutil.copyfile(path, target / path.name)) for path in copies]
     for name in (*(figure.name for figure in FIGURES), "source"):
         manifest = folder / name / store.MANIFEST

@@ -201,3 +201,35 @@ def test_solver_over_an_axis_of_environments(source, target):
     for i, params in enumerate((source, target)):
         alone = exact.evaluate_policy(params, exact.optimal_policy(params))
         np.testing.assert_allclose([x[i] for x in run], alone, rtol=1e-5)
+
+
+def visits_of_first_states(model, slots):
+    """[S, S] how often (first state, observed state) occur per slot of an episode, by powers of the matrix."""
+    matrix, power, total = model.transition(), np.eye(len(model.states)), 0.0
+    for _ in range(slots):
+        total, power = total + power, power @ matrix
+    first = np.array([np.prod([tau[j] for tau, j in zip(model.priors, s, strict=True)]) for s in model.states])
+    return first[:, None] * total / slots
+
+
+@pytest.mark.parametrize("slots", [1, 7])
+def test_a_first_state_that_decides_all_slots(environments, slots):
+    params = environments["random-1"].replace(reward_state="episode_start", max_steps_in_episode=slots)
+    model = Model(params)
+    pairs, rewards = visits_of_first_states(model, slots), model.expected_reward()
+    policy = np.random.default_rng(5).dirichlet(np.ones(params.num_actions), len(rewards))
+    taken = pairs @ policy  # [S, A] actions while each first state decides
+    earned = exact.evaluate_policy(params, jnp.asarray(policy, jnp.float32))
+    np.testing.assert_allclose(earned.reward, (taken * rewards).sum(), rtol=1e-4)
+    np.testing.assert_allclose(earned.throughput, (taken * model.packets).sum(), rtol=1e-4)
+    np.testing.assert_allclose(earned.miss_detection, (taken * model.miss).sum(), rtol=1e-4)
+    observed = (pairs.T @ rewards) / pairs.sum(axis=0)[:, None]
+    np.testing.assert_allclose(exact.expected_reward(params), observed, rtol=1e-4, atol=1e-4)
+    best = exact.evaluate_policy(params, exact.optimal_policy(params)).reward
+    np.testing.assert_allclose(best, (pairs.sum(axis=0) * observed.max(axis=1)).sum(), rtol=1e-4)
+
+
+def test_a_first_state_decides_one_slot_as_the_current_one(environments):
+    current = environments["random-1"].replace(max_steps_in_episode=1)
+    first = current.replace(reward_state="episode_start")
+    np.testing.assert_allclose(exact.expected_reward(first), exact.expected_reward(current), rtol=1e-5, atol=1e-5)

@@ -50,7 +50,7 @@ class Malformed:
     def __init__(self, seed: int, target, tmp_path):
         self.random = random.Random(seed)
         self.target, self.key, self.path = target, jax.random.key(0), tmp_path
-        self.keys, self.state = jax.random.split(self.key, 2), jrcjax.EnvState(jnp.int32(0), jnp.int32(0))
+        self.keys, self.state = jax.random.split(self.key, 2), jrcjax.EnvState(jnp.int32(0), jnp.int32(0), jnp.int32(0))
         self.fields = sorted(leaves_of(target))
         self.env = jrcjax.JRCEnv(target)
         for name in ("ddqn", "tlwd"):  # estimates use small constants, such as the features of states

@@ -64,7 +64,7 @@ def drawn(figure):
 
 def test_a_radar_slot():
     params = tiny_params()
-    env, key, state = jrcjax.JRCEnv(), jax.random.key(3), jrcjax.EnvState(jnp.int32(9), jnp.int32(0))
+    env, key, state = jrcjax.JRCEnv(), jax.random.key(3), jrcjax.EnvState(jnp.int32(9), jnp.int32(0), jnp.int32(9))
     _, _, reward, _, info = env.step_env(key, state, 4, params)
     figure = render.slot_figure(key, state, 4, params)
     groups, legend, texts = drawn(figure)

@@ -55,7 +55,7 @@ class GymnasiumEnv(gymnasium.Env):
         self.observation_space = gymnasium.spaces.Box(0.0, 1.0, (len(self.params.shape),), np.float32)
         self.action_space = gymnasium.spaces.Discrete(self._num_actions)
         self._first_seed = seed
-        self._state, self._time = 0, -1  # no episode yet
+        self._state, self._first, self._time = 0, 0, -1  # no episode yet
         self._last_slot: tuple[list[int], int, int] | None = None  # random words, state, action
         self._words: list[list[int]] = []
         self._spec: EnvSpec | None = None
@@ -87,7 +87,8 @@ class GymnasiumEnv(gymnasium.Env):
         super().reset(seed=seed, options=options)
         if seed is not None:
             self._words = []
-        self._state, self._time, self._last_slot = self._slots.first_state(self._random_words()), 0, None
+        self._state = self._first = self._slots.first_state(self._random_words())
+        self._time, self._last_slot = 0, None
         return self._slots.features(self._state), {}
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
@@ -102,7 +103,7 @@ class GymnasiumEnv(gymnasium.Env):
         if type(action) is not int or not 0 <= action < self._num_actions:
             action = self._as_int(action)
         words, state = self._random_words(), self._state
-        outcome = self._slots.run_one(words, state, action)
+        outcome = self._slots.run_one(words, state, action, self._first)
         self._last_slot = words, state, action
         self._state, self._time = outcome.next_state, self._time + 1
         over = self._time == self._limit
@@ -126,4 +127,4 @@ class GymnasiumEnv(gymnasium.Env):
 
         words, state, action = self._last_slot or (None, self._state, None)
         words = None if words is None else np.asarray(words, np.uint32)
-        return render.rgb_array(render.figure_of_words(words, state, action, self.params))
+        return render.rgb_array(render.figure_of_words(words, state, action, self.params, self._first))

@@ -20,6 +20,7 @@ from jrcjax.checks import require_type
 from jrcjax.model import slot, states
 from jrcjax.model.params import EnvParams, check_params
 from jrcjax.model.presets import paper_params
+from jrcjax.readings import RewardState
 
 _SHIFT = 32 - UNIFORM_BITS
 _KEPT = 16  # environments whose tables stay in memory
@@ -50,6 +51,7 @@ class TableSlots:
         self._later = [(t.kept_below, t.later.tolist(), t.stride, t.size) for t in tables.factors]
         self._first_cell: list[int] = tables.first_cell.tolist()
         self._reward, self._reward_in_event = tables.reward
+        self._first_decides = bool(params.reward_state == RewardState.EPISODE_START)
 
     def features(self, state: np.ndarray | int) -> np.ndarray:
         """Observations [..., F] float32 of state ids [...], as a new array."""
@@ -67,21 +69,23 @@ class TableSlots:
             state += _level(number, cuts) * stride
         return state
 
-    def run_one(self, words: Sequence[int], state: int, action: int) -> Outcome:
+    def run_one(self, words: Sequence[int], state: int, action: int, first: int) -> Outcome:
         """One slot of one environment; arguments as for `slot.run_slot`."""
         tables, new = self.tables, 0
+        deciding = first if self._first_decides else state
         for word, (kept_below, cuts, stride, size) in zip(words, self._later, strict=False):
             number = word >> _SHIFT
             level = state // stride % size if number < kept_below else bisect_right(cuts, number)
             new += level * stride
-        event = (words[-2] >> _SHIFT) < tables.event_below.item(state)
-        within = state // self._later[0][2] if action < self._rates else words[-1] * self._placements >> 32
+        event = (words[-2] >> _SHIFT) < tables.event_below.item(deciding)
+        within = deciding // self._later[0][2] if action < self._rates else words[-1] * self._placements >> 32
         cell = self._first_cell[action] + within
         reward = self._reward_in_event if event else self._reward
         return Outcome(new, reward.item(cell), event, tables.packets.item(cell), tables.miss_ratio.item(cell))
 
-    def run(self, words: np.ndarray, state: np.ndarray, action: np.ndarray) -> Outcome:
-        """One slot of N environments: words [NUM_WORDS, N] uint32, state ids [N] int64, actions [N]."""
+    def run(self, words: np.ndarray, state: np.ndarray, action: np.ndarray, first: np.ndarray) -> Outcome:
+        """One slot of N environments: words [NUM_WORDS, N] uint32, state ids and first ones [N] int64, actions [N]."""
+        deciding = first if self._first_decides else state
         tables, numbers = self.tables, words >> _SHIFT
         new = np.zeros_like(state)
         for number, (kept_below, cuts, stride, size) in zip(numbers, self._later, strict=False):
@@ -89,9 +93,9 @@ class TableSlots:
             if kept_below:
                 level = np.where(number < kept_below, state // stride % size, level)
             new += level * stride
-        event = numbers[-2] < tables.event_below.take(state)
+        event = numbers[-2] < tables.event_below.take(deciding)
         placement = (words[-1].astype(np.uint64) * self._placements >> 32).astype(np.int64)
-        within = np.where(action < self._rates, state // self._later[0][2], placement)
+        within = np.where(action < self._rates, deciding // self._later[0][2], placement)
         cell = tables.first_cell.take(action) + within
         reward = np.where(event, self._reward_in_event.take(cell), self._reward.take(cell))
         return Outcome(new, reward, event, tables.packets.take(cell), tables.miss_ratio.take(cell))
@@ -126,22 +130,24 @@ class JaxSlots:
         require_jax("an environment without tables")
         return np.array(_first_states(words, self.params), np.int64)
 
-    def run_one(self, words: Sequence[int], state: int, action: int) -> Outcome:
+    def run_one(self, words: Sequence[int], state: int, action: int, first: int) -> Outcome:
         """One slot of one environment; arguments as for `slot.run_slot`."""
         require_jax("an environment without tables")
-        outcome = _run_slot(np.asarray(words, np.uint32), np.int32(state), np.int32(action), self.params)
+        ids = np.int32(state), np.int32(action)
+        outcome = _run_slot(np.asarray(words, np.uint32), *ids, self.params, np.int32(first))
         return Outcome(*(getattr(outcome, name).item() for name in Outcome._fields))
 
-    def run(self, words: np.ndarray, state: np.ndarray, action: np.ndarray) -> Outcome:
-        """One slot of N environments: words [NUM_WORDS, N] uint32, state ids [N] int64, actions [N]."""
+    def run(self, words: np.ndarray, state: np.ndarray, action: np.ndarray, first: np.ndarray) -> Outcome:
+        """One slot of N environments: words [NUM_WORDS, N] uint32, state ids and first ones [N] int64, actions [N]."""
         require_jax("an environment without tables")
-        outcome = _run_slots(words, state.astype(np.int32), action.astype(np.int32), self.params)
+        state, action, first = (ids.astype(np.int32) for ids in (state, action, first))
+        outcome = _run_slots(words, state, action, self.params, first)
         numbers = Outcome(*(np.array(getattr(outcome, name)) for name in Outcome._fields))
         return numbers._replace(next_state=numbers.next_state.astype(np.int64))
 
 
 _run_slot = jax.jit(slot.run_slot)
-_run_slots = jax.jit(jax.vmap(slot.run_slot, in_axes=(1, 0, 0, None)))
+_run_slots = jax.jit(jax.vmap(slot.run_slot, in_axes=(1, 0, 0, None, 0)))
 _first_states = jax.jit(jax.vmap(slot.initial_state, in_axes=(1, None)))
 
 Slots: TypeAlias = TableSlots | JaxSlots

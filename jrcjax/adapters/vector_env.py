@@ -67,7 +67,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._first_seed = seed
-        self._state = np.zeros(num_envs, np.int64)
+        self._state = self._first = np.zeros(num_envs, np.int64)
         self._time = np.full(num_envs, -1)  # no episode yet
 
     def _random_words(self) -> np.ndarray:
@@ -75,7 +75,8 @@ class VectorEnv(gymnasium.vector.VectorEnv):
 
     def _begin(self, where: np.ndarray) -> None:
         """New episodes of the environments in a mask [N]."""
-        self._state = np.where(where, self._slots.first_states(self._random_words()), self._state)
+        first = self._slots.first_states(self._random_words())
+        self._first, self._state = np.where(where, first, self._first), np.where(where, first, self._state)
         self._time = np.where(where, 0, self._time)
 
     def reset(
@@ -101,7 +102,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         over = self._time == self._limit
         if (self._time < 0).any() or (self._mode == AutoresetMode.DISABLED and over.any()):
             raise ResetNeeded("call reset() first, for every environment without an episode")
-        outcome = self._slots.run(self._random_words(), self._state, self._checked(actions))
+        outcome = self._slots.run(self._random_words(), self._state, self._checked(actions), self._first)
         self._state, self._time = outcome.next_state, self._time + 1
         reward = outcome.reward.astype(np.float64)
         infos = {name: getattr(outcome, name) for name in _INFO}

@@ -20,10 +20,14 @@ _ONE_KEY = "one key, as jax.random.key returns it; use vmap for several"
 
 @struct.dataclass
 class EnvState:
-    """A state id and the number of slots since the episode began."""
+    """Where an episode is; scalars."""
 
     id: Int
+    """State id."""
     time: Int
+    """Slots since the episode began."""
+    first: Int
+    """Id of the episode's first state, for the reading `reward_state`."""
 
 
 class JRCEnv:
@@ -84,7 +88,8 @@ class JRCEnv:
         require_type("params", params, EnvParams)
         require_keys(key, 0, _ONE_KEY)
         words = jax.random.bits(key, (slot.NUM_WORDS,), jnp.uint32)
-        state = EnvState(slot.initial_state(words, params), jnp.int32(0))
+        first = slot.initial_state(words, params)
+        state = EnvState(first, jnp.int32(0), first)
         return self.get_obs(state, params), state
 
     def reset(self, key: Key, params: EnvParams | None = None) -> tuple[Float, EnvState]:
@@ -97,8 +102,8 @@ class JRCEnv:
         """One slot without reset: (obs, state, reward, terminated, info)."""
         _check_step(key, state, action, params)
         words = jax.random.bits(key, (slot.NUM_WORDS,), jnp.uint32)
-        outcome = slot.run_slot(words, state.id, jnp.asarray(action, jnp.int32), params)
-        new = EnvState(outcome.next_state, state.time + 1)
+        outcome = slot.run_slot(words, state.id, jnp.asarray(action, jnp.int32), params, state.first)
+        new = EnvState(outcome.next_state, state.time + 1, state.first)
         info = {"event": outcome.event, "packets": outcome.packets, "miss_ratio": outcome.miss_ratio}
         terminated = (new.time >= params.max_steps_in_episode) & (params.terminal_time_limit == 1)
         return self.get_obs(new, params), new, outcome.reward, terminated, info

@@ -24,7 +24,7 @@ from jrcjax.containers import (
 from jrcjax.model import states
 from jrcjax.model.channel import Channel
 from jrcjax.radar.bank import Radar
-from jrcjax.readings import EventModel, MissConvention
+from jrcjax.readings import EventModel, MissConvention, RewardState
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -62,6 +62,8 @@ class EnvParams(Container):
     """Reading A3: whether packets sent in a slot with an event count as throughput."""
     terminal_time_limit: Int[Array, ""] = flag(default=False)
     """Reading A11: whether the time limit is a terminal state, and not a truncation."""
+    reward_state: Int[Array, ""] = reading(RewardState)
+    """Reading A26: which state a slot's event, packets and reward belong to."""
     max_steps_in_episode: int = count(default=300)
     """Slots per episode."""
 

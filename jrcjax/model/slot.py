@@ -14,6 +14,7 @@ from jrcjax.model.params import FACTORS, EnvParams
 from jrcjax.model.rewards import reward
 from jrcjax.model.transitions import initial_levels, next_levels
 from jrcjax.radar.bank import slot_miss_ratio
+from jrcjax.readings import RewardState
 from jrcjax.types import Bool, Float, Int, Words
 
 NUM_WORDS = len(FACTORS) + 2
@@ -38,7 +39,7 @@ def initial_state(words: Words, params: EnvParams) -> Int:
     return states.id_of(initial_levels(rng.uniform(words[: len(FACTORS)]), params), params.shape)
 
 
-def run_slot(words: Words, state: Int, action: Int, params: EnvParams) -> Outcome:
+def run_slot(words: Words, state: Int, action: Int, params: EnvParams, first: Int | None = None) -> Outcome:
     """Runs one slot.
 
     Args:
@@ -46,14 +47,16 @@ def run_slot(words: Words, state: Int, action: Int, params: EnvParams) -> Outcom
       state: state id, a scalar.
       action: a data rate 0..L-1 or a radar mode L..L+K-1, a scalar.
       params: the environment.
+      first: id of the episode's first state, a scalar; `state` if None.
     """
     levels = states.levels_of(state, params.shape)
+    deciding = states.levels_of(_deciding_state(state, first, params), params.shape)
     u = rng.uniform(words[:-1])
-    event = u[-1] < event_probability_at(levels, params)
+    event = u[-1] < event_probability_at(deciding, params)
     is_data = action < params.num_rates
     rate = jnp.minimum(action, params.num_rates - 1)
     mode = jnp.maximum(action - params.num_rates, 0)
-    packets = jnp.where(is_data, delivered_packets(levels[0], rate, params.channel), 0.0)
+    packets = jnp.where(is_data, delivered_packets(deciding[0], rate, params.channel), 0.0)
     miss = metrics.slot_miss(is_data, slot_miss_ratio(words[-1], mode, params.radar))
     return Outcome(
         next_state=states.id_of(next_levels(u[:-1], levels, params), params.shape),
@@ -63,6 +66,13 @@ def run_slot(words: Words, state: Int, action: Int, params: EnvParams) -> Outcom
         packets=packets,
         miss_ratio=miss,
     )
+
+
+def _deciding_state(state: Int, first: Int | None, params: EnvParams) -> Int:
+    """The state that a slot's event, packets and reward belong to."""
+    if first is None:
+        return state
+    return jnp.where(params.reward_state == RewardState.EPISODE_START, first, state)
 
 
 def measure(sums: metrics.Metrics, outcome: Outcome, params: EnvParams) -> metrics.Metrics:

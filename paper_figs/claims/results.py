@@ -10,6 +10,7 @@ import xarray as xr
 
 from paper_figs.analysis.convergence import TOLERANCE, convergence_episode, curve_gaps, gaps
 from paper_figs.analysis.scores import mean_over_episodes
+from paper_figs.claims.delta import Delta
 
 
 class Axis(NamedTuple):
@@ -32,20 +33,6 @@ AXES = {
 
 class Unknown(LookupError):
     """These results cannot answer a claim's question; the text says why."""
-
-
-@dataclass(frozen=True)
-class Delta:
-    """Differences up to these are negligible."""
-
-    reward: float = 0.01
-    """Share of the optimum's reward."""
-    throughput: float = 0.02
-    """Share of the other learner's throughput."""
-    miss_detection: float = 0.01
-    """Probability."""
-    episodes: float = 10.0
-    """Between the episodes in which learners converge."""
 
 
 @dataclass(frozen=True)

@@ -54,11 +54,12 @@ def _draw_target(axes: Axes, numbers: pd.DataFrame) -> None:
         axes.plot(optimum.x, optimum["mean"], "*", color="black", markersize=6, label=label)
     for name, look in style.LOOKS.items():
         for point in numbers.query(f"algorithm == {name!r}").itertuples():
-            _draw_point(axes, point, look, has_label=point.convention == numbers["convention"].iloc[0])
+            _draw_point(axes, point, look, labelled=numbers["convention"].iloc[0])
 
 
-def _draw_point(axes: Axes, point: Any, look: style.Look, has_label: bool) -> None:
+def _draw_point(axes: Axes, point: Any, look: style.Look, labelled: str) -> None:
     has_bars = point.n_seeds > 1
+    label = look.label if point.n_seeds else f"{look.label}, random"
     axes.errorbar(
         point.x,
         point.mean,
@@ -70,7 +71,7 @@ def _draw_point(axes: Axes, point: Any, look: style.Look, has_label: bool) -> No
         markerfacecolor="white" if look.hollow else look.color,
         elinewidth=0.6,
         linestyle="",
-        label=(look.label if has_bars or point.n_seeds else f"{look.label}, random") if has_label else None,
+        label=label if point.convention == labelled else None,
     )
 
 

@@ -172,7 +172,7 @@ def test_gymnax_ends_of_episodes(terminal):
     env = contract_env()
     params = PARAMS.replace(max_steps_in_episode=3, terminal_time_limit=jnp.int32(terminal))
     for time in range(4):
-        state = jrcjax.EnvState(jnp.int32(7), jnp.int32(time))
+        state = jrcjax.EnvState(jnp.int32(7), jnp.int32(time), jnp.int32(7))
         ends = bool(terminal) and time == 3
         assert bool(env.is_terminated(state, params)) == bool(env.is_terminal(state, params)) == ends
         assert bool(env.is_truncated(state, params)) == (not terminal and time == 3)

@@ -11,9 +11,9 @@ import jrcjax
 from jrcjax.adapters.slots import JaxSlots, TableSlots, slots_of
 from jrcjax.adapters.tables import MOST_STATES, fit, tables_of
 from jrcjax.model import slot
-from jrcjax.model.params import make_factor
+from jrcjax.model.params import Factor
 
-run_slots = jax.jit(jax.vmap(slot.run_slot, in_axes=(1, 0, 0, None)))
+_run_slots = jax.jit(jax.vmap(slot.run_slot, in_axes=(1, 0, 0, None, 0)))
 first_states = jax.jit(jax.vmap(slot.initial_state, in_axes=(1, None)))
 
 
@@ -47,22 +47,29 @@ def assert_equal(got, wanted):
         np.testing.assert_array_equal(getattr(got, name), getattr(wanted, name), err_msg=name)
 
 
+def run_slots(words, state, action, first, params):
+    state, action, first = (ids.astype(np.int32) for ids in (state, action, first))
+    return _run_slots(words, state, action, params, first)
+
+
 def assert_tables_are_the_model(params):
     slots = slots_of(params)
     assert isinstance(slots, TableSlots)
     words, state, action = random_slots(params, 20_000)
-    got = slots.run(words, state, action)
-    wanted = run_slots(words, state.astype(np.int32), action.astype(np.int32), params)
-    assert_equal(got, wanted)
     first = slots.first_states(words)
+    got = slots.run(words, state, action, first)
+    wanted = run_slots(words, state, action, first, params)
+    assert_equal(got, wanted)
     np.testing.assert_array_equal(first, first_states(words, params))
     rows = words.T.tolist()
     for i in range(1000):
-        one = slots.run_one(rows[i], int(state[i]), int(action[i]))
+        one = slots.run_one(rows[i], int(state[i]), int(action[i]), int(first[i]))
         assert one == tuple(column[i].item() for column in got)
         assert [type(number) for number in one] == [int, float, bool, float, float]
         assert slots.first_state(rows[i]) == first[i]
-    features = jax.vmap(lambda s: jrcjax.JRCEnv().get_obs(jrcjax.EnvState(s, jnp.int32(0)), params))(jnp.asarray(first))
+    features = jax.vmap(lambda s: jrcjax.JRCEnv().get_obs(jrcjax.EnvState(s, jnp.int32(0), s), params))(
+        jnp.asarray(first)
+    )
     np.testing.assert_array_equal(slots.features(first), features)
 
 
@@ -71,11 +78,14 @@ def test_tables_are_the_model(any_params):
     assert_tables_are_the_model(any_params)
 
 
-@pytest.mark.parametrize("event_model", [0, 1, 2])
-def test_tables_are_the_model_in_every_reading_of_events(event_model):
+@pytest.mark.parametrize(
+    "reading", [{"event_model": i} for i in range(3)] + [{"reward_state": "episode_start"}], ids=str
+)
+def test_tables_are_the_model_in_every_reading_of_events(reading):
     params = tiny_params()
-    speed = make_factor([0.0, 0.25, 0.75], [0.2, 0.0, 1.0], 0.9)  # a level that is never drawn, one surely an event
-    assert_tables_are_the_model(params.replace(event_model=jnp.int32(event_model), speed=speed))
+    # A level that is never drawn, and one with an event for sure.
+    speed = Factor(prior=[0.0, 0.25, 0.75], event_probability=[0.2, 0.0, 1.0], persistence=0.9)
+    assert_tables_are_the_model(params.replace(speed=speed, **reading))
 
 
 def test_the_law_of_transitions_and_events():
@@ -85,7 +95,7 @@ def test_the_law_of_transitions_and_events():
     generator = np.random.default_rng(1)
     words = generator.integers(2**32, size=(slot.NUM_WORDS, number), dtype=np.uint32)
     state, action = generator.integers(states, size=number), generator.integers(params.num_actions, size=number)
-    outcome = slots_of(params).run(words, state, action)
+    outcome = slots_of(params).run(words, state, action, state)
     counts = np.zeros((states, states))
     np.add.at(counts, (state, outcome.next_state), 1)
     assert chi_square(counts, np.asarray(jrcjax.exact.state_transition(params))) > ALPHA
@@ -101,8 +111,8 @@ def test_the_law_of_rewards_is_the_models():
     params, number = tiny_params(), 200_000
     ours, models = (random_words(seed, number) for seed in (2, 3))
     state, action = np.arange(number) % params.num_states, np.arange(number) // params.num_states % params.num_actions
-    got = slots_of(params).run(ours, state, action).reward
-    wanted = np.asarray(run_slots(models, state.astype(np.int32), action.astype(np.int32), params).reward)
+    got = slots_of(params).run(ours, state, action, state).reward
+    wanted = np.asarray(run_slots(models, state, action, state, params).reward)
     values = np.unique(np.concatenate([got, wanted]))
     counts = [np.bincount(np.searchsorted(values, rewards), minlength=len(values)) for rewards in (got, wanted)]
     assert len(values) > 5
@@ -119,24 +129,24 @@ def test_fresh_placements_come_from_the_model():
     slots = slots_of(fresh)
     assert isinstance(slots, JaxSlots)
     words, state, action = random_slots(params, 64)
-    got = slots.run(words, state, action)
-    wanted = run_slots(words, state.astype(np.int32), action.astype(np.int32), fresh)
+    got = slots.run(words, state, action, state)
+    wanted = run_slots(words, state, action, state, fresh)
     assert_equal(got, wanted)
     assert set(got.miss_ratio) - set(slots_of(params).tables.miss_ratio)  # Poisson counts, so none of the bank's
-    one = slots.run_one(words[:, 3].tolist(), int(state[3]), int(action[3]))
+    one = slots.run_one(words[:, 3].tolist(), int(state[3]), int(action[3]), int(state[3]))
     assert one == tuple(column[3].item() for column in got)
     assert slots.first_state(words[:, 3].tolist()) == slots.first_states(words)[3]
     np.testing.assert_array_equal(slots.features(state), slots_of(params).features(state))
 
 
 def test_states_that_no_table_holds():
-    levels = make_factor(np.full(100, 0.01), np.linspace(0.0, 0.1, 100))
+    levels = Factor(prior=np.full(100, 0.01), event_probability=np.linspace(0.0, 0.1, 100))
     params = tiny_params().replace(road=levels, weather=levels, speed=levels)
     assert params.num_states > MOST_STATES
     assert not fit(params)
     slots = slots_of(params)
     state = slots.first_state([2**31] * slot.NUM_WORDS)
-    assert 0 <= slots.run_one([2**31] * slot.NUM_WORDS, state, 0).next_state < params.num_states
+    assert 0 <= slots.run_one([2**31] * slot.NUM_WORDS, state, 0, state).next_state < params.num_states
     assert slots.features(state).shape == (5,)
 
 

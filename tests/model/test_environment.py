@@ -147,7 +147,7 @@ def test_reset_and_step_shapes(env, target):
 
 
 def test_a_key_decides_everything(env, target):
-    state = EnvState(jnp.int32(5), jnp.int32(0))
+    state = EnvState(jnp.int32(5), jnp.int32(0), jnp.int32(5))
     first, again, other = (env.step(jax.random.key(k), state, 2, target) for k in (3, 3, 4))
     for a, b in zip(jax.tree.leaves(first), jax.tree.leaves(again), strict=True):
         np.testing.assert_array_equal(a, b)
@@ -164,7 +164,7 @@ def test_keys_are_used_once(env, target):
 def test_time_limit(env, target, terminal):
     params = target.replace(terminal_time_limit=jnp.int32(terminal))
     step = jax.jit(env.step)
-    before = EnvState(jnp.int32(31), jnp.int32(298))
+    before = EnvState(jnp.int32(31), jnp.int32(298), jnp.int32(31))
     _, state, _, terminated, truncated, _ = step(jax.random.key(2), before, 0, params)
     assert (int(state.time), bool(terminated), bool(truncated)) == (299, False, False)
     obs, new, _, terminated, truncated, info = step(jax.random.key(3), state, 0, params)
@@ -181,7 +181,7 @@ def test_time_limit(env, target, terminal):
 
 def test_reset_is_independent_of_the_last_slot(env, target):
     keys = jax.random.split(jax.random.key(5), 20_000)
-    last = EnvState(jnp.int32(0), jnp.int32(299))
+    last = EnvState(jnp.int32(0), jnp.int32(299), jnp.int32(0))
     step = jax.jit(jax.vmap(env.step, in_axes=(0, None, None, None)))
     _, new, _, _, _, info = step(keys, last, 0, target)
     final = states.id_of(jnp.rint(info["final_observation"]).astype(jnp.int32), target.shape)
@@ -192,7 +192,7 @@ def test_reset_is_independent_of_the_last_slot(env, target):
 
 
 def test_episode_length_is_a_parameter(env, target):
-    state = EnvState(jnp.int32(0), jnp.int32(6))
+    state = EnvState(jnp.int32(0), jnp.int32(6), jnp.int32(0))
     assert bool(env.step(jax.random.key(0), state, 0, target.replace(max_steps_in_episode=7))[4])
     assert not bool(env.step(jax.random.key(0), state, 0, target.replace(max_steps_in_episode=8))[4])
 
@@ -201,7 +201,7 @@ def test_parameters_as_an_axis(env, source, target):
     # A slot of many environments at once is what each gives alone.
     both = jax.tree.map(lambda *leaves: jnp.stack(leaves), source, target)
     key = jax.random.key(6)
-    state = EnvState(jnp.int32(9), jnp.int32(0))
+    state = EnvState(jnp.int32(9), jnp.int32(0), jnp.int32(9))
     together = jax.jit(jax.vmap(env.step, in_axes=(None, None, None, 0)))(key, state, 2, both)
     for i, params in enumerate((source, target)):
         alone = jax.jit(env.step)(key, state, 2, params)
@@ -221,3 +221,21 @@ def test_step_is_traced_once(env, source, target):
     for params in (source, target, target.replace(event_model=jnp.int32(2), terminal_time_limit=jnp.int32(1))):
         state = step(jax.random.key(1), state, jnp.int32(0), params)[1]
     assert len(traces) == 1
+
+
+@pytest.mark.parametrize(("reading", "constant"), [("current", False), ("episode_start", True)])
+def test_the_first_state_decides_all_events_of_an_episode_or_none_but_its_own(environments, reading, constant):
+    params = environments["short-target"]
+    never, at_high_speed = (params.road.replace(event_probability=p) for p in ((0.0, 0.0), (0.0, 1.0)))
+    params = params.replace(road=never, weather=never, nearby=never, speed=at_high_speed, reward_state=reading)
+    env = JRCEnv(params)
+
+    def one_slot(state, key):
+        _, new, _, _, _, info = env.step(key, state, 0, params)
+        return new, (states.levels_of(state.id, params.shape)[3], info["event"])
+
+    _, start = env.reset(jax.random.key(0), params)
+    _, (speeds, events) = jax.jit(lambda: jax.lax.scan(one_slot, start, jax.random.split(jax.random.key(1), 400)))()
+    speeds, events = (np.asarray(a).reshape(20, 20) for a in (speeds, events))  # episodes of 20 slots
+    np.testing.assert_array_equal(events, speeds[:, :1] + 0 * speeds if constant else speeds)
+    assert 0 < events.mean() < 1

@@ -11,8 +11,9 @@ import worlds
 from worlds import NEVER, Learner, study
 
 from paper_figs.claims import effects, judge, table, words
+from paper_figs.claims.delta import Delta
 from paper_figs.claims.effects import EveryLead, HardlyMoves, MeanLead, Movement, RelativeLevel, Trend, TypicalEpisode
-from paper_figs.claims.results import AXES, Agent, Delta, Results, Rules
+from paper_figs.claims.results import AXES, Agent, Results, Rules
 from paper_figs.claims.table import CLAIMS, claims_of, claims_of_figure
 
 COMPARED = (

@@ -115,6 +115,8 @@ def test_one_command_writes_everything(tmp_path, capsys):
     [
         (["--only", "4"], "only: [4]; allowed: 5, 6, 7, 8, 9"),
         (["--seeds", "-1"], "seeds: -1; allowed: an int from 1"),
+        (["--delta.reward", "0"], "delta.reward: 0.0; allowed: a number > 0"),
+        (["--delta.episodes", "nan"], "delta.episodes: nan; allowed: a number > 0"),
         (["--preset", "x"], "preset: 'x'; allowed: paper, paper_table, or a file"),
     ],
 )

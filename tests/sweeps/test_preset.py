@@ -4,6 +4,7 @@ import dataclasses
 import json
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import jrcjax
@@ -11,11 +12,13 @@ from jrcjax.config.toml import save_params
 from jrcjax.readings import CountingRule, Distance
 from paper_figs.__main__ import main as figures_main
 from sweeps.__main__ import main as sweeps_main
+from sweeps.engine.estimate import seconds_per_episode
 from sweeps.engine.program import points_of
-from sweeps.preset import check_preset, environment_of, preset_of
+from sweeps.preset import check_preset, environment_of, preset_of, slots_of
 from sweeps.results.store import digest_of
 from sweeps.studies.multiverse import UNIVERSES, read_as
 from sweeps.studies.registry import SWEEPS
+from sweeps.sweep import Size, Study, size_of
 
 TRAFFIC = """\
 # Objects as somebody counted them.
@@ -94,12 +97,33 @@ def test_universes_take_the_sizes_from_the_file(traffic):
         )
 
 
+def test_slots_of_an_episode_are_those_of_the_file(traffic):
+    traffic.write_text(f"max_steps_in_episode = 60\n{TRAFFIC}")
+    preset = preset_of(str(traffic))
+    assert (slots_of(preset), slots_of("paper")) == (60, 300)
+    of_file, of_paper = (seconds_per_episode(SWEEPS["fig8"], Size(preset=p), 8) for p in (preset, "paper"))
+    np.testing.assert_allclose(of_file, of_paper / 5)
+
+
+def test_a_study_with_its_own_presets_takes_no_file(traffic):
+    study = Study("study", "", (SWEEPS["fig8"],), presets=("paper",))
+    for preset in ("paper_table", preset_of(str(traffic))):
+        with pytest.raises(ValueError, match=r"preset: '(paper_table|file-)"):
+            size_of(None, None, preset, smoke=False, study=study)
+    assert size_of(None, None, "paper", smoke=False, study=study) == Size()
+
+
 @pytest.mark.slow
 def test_figures_and_sweeps_take_a_file(traffic, tmp_path, capsys):
     size = ["--seeds", "1", "--episodes", "2"]
+    traffic.write_text(f"max_steps_in_episode = 40\n{TRAFFIC}")
     assert figures_main(["--only", "8", *size, "--preset", str(traffic), "--out", str(tmp_path / "figures")]) == 0
     (results,) = (tmp_path / "figures" / "results").iterdir()
     assert results.name.startswith("file-")
+    tables = {name: pd.read_csv(tmp_path / "figures" / f"{name}.csv") for name in ("fig8", "regret")}
+    per_episode = tables["fig8"].query("panel == 'b' and algorithm == 'optimum'")["mean"].to_numpy()
+    per_slot = tables["regret"].query("algorithm == 'ddqn'").optimum_throughput.to_numpy()
+    np.testing.assert_allclose(per_episode, 40 * per_slot, rtol=1e-4)
     page = (tmp_path / "figures" / "report.html").read_text()
     assert "--preset FILE.toml" in page
     assert "size_mean = [[4.5, 2.0], [0.75, 0.5]]" in page

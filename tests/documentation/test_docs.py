@@ -1,0 +1,64 @@
+"""The pages' code runs as written, what they name exists, and the site has a place for each of them."""
+
+import re
+from pathlib import Path
+
+import matplotlib as mpl
+import pytest
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+PAGES = sorted(DOCS.rglob("*.md"))
+BLOCK = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
+NEEDS = {"other_libraries.md": "gymnasium"}
+WITH_CODE = [page for page in PAGES if BLOCK.search(page.read_text())]
+
+
+def name_of(page):
+    return page.relative_to(DOCS).as_posix()
+
+
+@pytest.mark.parametrize("page", WITH_CODE, ids=name_of)
+def test_code_runs_as_written_one_block_after_the_other(page, tmp_path, monkeypatch):
+    if page.name in NEEDS:
+        pytest.importorskip(NEEDS[page.name])
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.path", [*__import__("sys").path])
+    names = {}
+    with mpl.rc_context({"backend": "agg"}):
+        for block in BLOCK.findall(page.read_text()):
+            exec(compile(block, name_of(page), "exec"), names)
+
+
+def test_there_is_code_to_run():
+    assert len(WITH_CODE) >= 9
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_files_that_pages_name_exist(page):
+    text = page.read_text()
+    folders = "jrcjax|sweeps|paper_figs|explorer|benchmarks|examples|tests|docs|published"
+    paths = re.findall(rf"`((?:{folders})/[\w./-]+)`", text)
+    assert [path for path in paths if not (ROOT / path).exists()] == []
+
+
+def test_every_page_has_its_place_in_the_site():
+    placed = set(re.findall(r": ([\w/-]+\.md)$", (ROOT / "mkdocs.yml").read_text(), re.MULTILINE))
+    made = set(re.findall(r'^    "([\w/-]+\.md)":', (DOCS / "hooks.py").read_text(), re.MULTILINE))
+    assert {name_of(page) for page in PAGES} <= placed
+    assert placed <= {name_of(page) for page in PAGES} | made
+
+
+def test_deviations_are_numbered_and_their_fields_exist():
+    text = (DOCS / "explanation" / "deviations.md").read_text()
+    assert [int(n) for n in re.findall(r"^## A(\d+): ", text, re.MULTILINE)] == list(range(1, 32))
+    fields = set((ROOT / "jrcjax" / "config" / "CONFIGURATION.md").read_text().split("`"))
+    for container, field in re.findall(r"`(EnvParams|Radar|HParams|Config)\.(\w+)`", text):
+        assert field in fields, f"{container}.{field} is not in the configuration"
+
+
+def test_commands_that_pages_name_are_targets():
+    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    for page in [*PAGES, ROOT / "README.md"]:
+        assert set(re.findall(r"`?make ([a-z][a-z-]+)", page.read_text())) <= targets | {"it", "the", "up"}
