@@ -28,20 +28,19 @@ import sys, time
 from jrcjax.training import parallel
 parallel.use_all_cores(); parallel.keep_compiled()
 import jax, jrcjax, numpy as np
-from jrcjax.training.rollout import spec_of
 from sweeps.engine import program
+from sweeps.engine.job import Job
 from sweeps.studies import registry
 from sweeps.sweep import Size
 sweep = registry.SWEEPS[sys.argv[1]]
-size = Size()
-points = program.points_of(sweep, size.preset)
-spec = spec_of(jax.tree.map(lambda a: a[0], points.params))
-compiled = program.program_of(sweep.learners, spec, sweep.config(size), program.chunk_of(size.episodes))
+job = Job(sweep, Size())
+points, config = job.points, job.groups[0].config
+compiled = program.program_of(sweep.learners, job.spec, config, program.chunk_of(config.episodes))
 lanes = parallel.padded(1)  # of every group
 source = None
 if sweep.source:
     def train(key):
-        return jrcjax.train_source(key, jrcjax.paper_params("source"), jrcjax.HParams(), sweep.config(size))[0]
+        return jrcjax.train_source(key, jrcjax.paper_params("source"), jrcjax.HParams(), config)[0]
     of_one = jax.eval_shape(train, jax.random.key(0))
     source = jax.tree.map(lambda a: jax.ShapeDtypeStruct((lanes, *a.shape), a.dtype), of_one)
 keys = program.keys_of(np.arange(lanes))

@@ -26,7 +26,7 @@ def is_traced(*values: Any) -> bool:
 def refuse(field: str, value: Any, allowed: str) -> NoReturn:
     """Raises the ValueError that all checks raise."""
     shown = value if isinstance(value, str | int | float) else np.asarray(value).tolist()
-    raise ValueError(f"{field}: {shown!r}; allowed: {allowed}")
+    raise ValueError(f"{field:.200}: {shown!r:.600}; allowed: {allowed:.900}")  # some lines at most
 
 
 def require(

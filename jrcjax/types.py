@@ -31,5 +31,5 @@ def choice(field: str, name: str, allowed: tuple[str, ...]) -> int:
       ValueError: naming the field, the value and what is allowed.
     """
     if not isinstance(name, str) or name not in allowed:
-        raise ValueError(f"{field}: {name!r} is unknown; allowed: {', '.join(map(repr, allowed))}")
+        raise ValueError(f"{field}: {name!r:.200} is unknown; allowed: {', '.join(map(repr, allowed))}")
     return allowed.index(name)

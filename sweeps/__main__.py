@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import importlib
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -15,8 +17,8 @@ from sweeps import interrupts
 from sweeps.command import begin
 from sweeps.options import FLAGS, Count, Preset
 from sweeps.preset import preset_of
-from sweeps.studies.custom import CUSTOM, Custom, Options, custom_sweep
-from sweeps.sweep import Study, size_of
+from sweeps.studies.custom import CUSTOM, Options, custom_sweep
+from sweeps.sweep import Size, Study, Sweep, size_of
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,8 @@ class Run:
     """Address of a Dask scheduler whose workers compute, such as tcp://host:8786."""
     workers: int | None = None
     """Compute in so many processes on this machine, as a local Dask cluster."""
+    readings: Count = None
+    """Of the multiverse, how many readings of the paper. Default: 512, or 2 with --smoke."""
     custom: tyro.conf.OmitArgPrefixes[Options] = field(default_factory=Options)
 
 
@@ -84,7 +88,7 @@ def main(args: list[str] | None = None) -> int:
 
 def _run(command: Command) -> int:
     """Does what the command says; returns the exit status."""
-    from sweeps.studies.registry import EVERY_SWEEP, STUDIES  # after parsing, so that --help and errors come at once
+    from sweeps.studies.registry import STUDIES  # after parsing, so that --help and errors come at once
 
     if isinstance(command, List):
         for study in STUDIES.values():
@@ -93,38 +97,47 @@ def _run(command: Command) -> int:
         return 0
     console = begin()
     from jrcjax.types import choice
-    from paper_figs.studies import custom
-    from paper_figs.studies.summaries import SUMMARIES
     from sweeps.engine.run import run_sweep
 
     if isinstance(command, Verify):
         return _verify(command)
     choice("name", command.name, (*STUDIES, CUSTOM))
     preset = preset_of(command.preset)
-    own = _own(command, preset, (*STUDIES, *EVERY_SWEEP))
-    study = Study(CUSTOM, "", (own.sweep,)) if own else STUDIES[command.name]
+    study = _study(command, preset)
     size = size_of(command.seeds, command.episodes, preset, command.smoke, study)
     size.check()
     sweeps = study.smoke_sweeps if command.smoke and study.smoke_sweeps else study.sweeps
     options = {"resume": command.resume, "save_agents": command.save_agents}
     with interrupts.terminable(), _client(command) as client:
         written = [run_sweep(sweep, size, command.out, console, **options, client=client) for sweep in sweeps]
-        if own:
-            written += custom.write(written[0], own, size.seeds)
-        if study.name in SUMMARIES:
-            written += SUMMARIES[study.name](sweeps, size, command.out)
+        if study.summary:
+            written += _found(study.summary)(sweeps, size, command.out)
     print("\n".join(map(str, written)))
     return 0
 
 
-def _own(command: Run, preset: str, taken: tuple[str, ...]) -> Custom | None:
-    """The sweep that the options of `run custom` describe; other sweeps refuse these options."""
+def _found(summary: str) -> Callable[[tuple[Sweep, ...], Size, Path], list[Path]]:
+    """The function that a study names as module:function."""
+    module, function = summary.split(":")
+    return getattr(importlib.import_module(module), function)
+
+
+def _study(command: Run, preset: str) -> Study:
+    """The study of a name; options that are only for another one are refused."""
+    from sweeps.studies import multiverse
+    from sweeps.studies.registry import EVERY_SWEEP, STUDIES
+
+    if command.name != multiverse.MULTIVERSE.name and command.readings is not None:
+        refuse("name", command.name, f"{multiverse.MULTIVERSE.name}, for which alone --readings is")
     if command.name == CUSTOM:
-        return custom_sweep(command.custom, preset, taken)
+        sweep = custom_sweep(command.custom, preset, (*STUDIES, *EVERY_SWEEP))
+        return Study(CUSTOM, sweep.description, (sweep,), summary="paper_figs.studies.custom:summarise")
     given = [name for name, value in vars(command.custom).items() if value != getattr(Options(), name)]
     if given:
-        refuse("name", command.name, f"{CUSTOM}, for which alone --{given[0]} is")
-    return None
+        refuse("name", command.name, f"{CUSTOM}, for which alone --{given[0].replace('_', '-')} is")
+    if command.name == multiverse.MULTIVERSE.name:
+        return multiverse.study_of(command.readings, command.smoke)
+    return STUDIES[command.name]
 
 
 def _client(command: Run) -> contextlib.AbstractContextManager:

@@ -17,16 +17,16 @@ def begin() -> Console:
     Raises:
       ValueError: naming JAX_PLATFORMS, if this machine has none of the platforms that it asks for.
     """
-    any_character()
-    os.environ["MPLBACKEND"] = "agg"
+    undisturbed()
     from jrcjax.training import parallel  # not before it is needed: --help and errors come at once
 
     parallel.start()
     return Console(stderr=True)
 
 
-def any_character() -> None:
-    """Shows a character that the locale does not know as its number, instead of stopping there."""
+def undisturbed() -> None:
+    """Draws figures for files alone, and shows a character that the locale does not know as its number."""
+    os.environ["MPLBACKEND"] = "agg"
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")  # pyright: ignore[reportAttributeAccessIssue]

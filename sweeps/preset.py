@@ -4,6 +4,16 @@ A file is what `jrcjax.load_params` reads, such as `python -m jrcjax.config.nusc
 paper's in the target environment and in the source environment alike, but for the traffic density: the file gives the
 target's, and the source has twice as much, as in Table I. A figure's own parameter replaces the file's.
 
+A file's table [set] sets single numbers by their dotted path (`jrcjax.config.paths`), those of the hyperparameters and
+of the settings among them, in the source and in the target alike:
+
+    [set]
+    "hparams.learning_rate" = 3e-5
+    "config.optimiser" = "rmsprop"
+    "source" = "table1"
+
+With the last line the source agents have Table I's hyperparameters and settings instead.
+
 A preset is a string: one of `PRESETS`, or the text of a file, so that workers and whoever verifies results have all
 that it says.
 """
@@ -11,12 +21,19 @@ that it says.
 from __future__ import annotations
 
 import hashlib
+import json
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
 
 from jrcjax.checks import is_positive, refuse, require
-from jrcjax.config.toml import description_of, params_of, text_of
+from jrcjax.config.paths import Points, parameter_at
+from jrcjax.config.stacking import Values, settings, stacked
+from jrcjax.config.toml import description_of, from_toml, params_of, text_of
+from jrcjax.learners.hparams import Config, HParams
 from jrcjax.model.params import EnvParams
 from jrcjax.model.presets import ENVIRONMENTS, PRESETS, paper_params
 from jrcjax.radar.paper import MAX_DENSITY
@@ -24,6 +41,10 @@ from jrcjax.radar.paper import MAX_DENSITY
 _ALLOWED = f"{', '.join(PRESETS)}, or a file that ends in .toml"
 _SOURCE_DENSITY = 2.0
 """Over that of the target, Table I."""
+_SET = "set"
+"""Table of a file with numbers by their path."""
+SOURCES = ("same", "table1")
+"""What source agents are trained with: the target's hyperparameters and settings, or Table I's."""
 
 
 def preset_of(option: str) -> str:
@@ -41,14 +62,22 @@ def preset_of(option: str) -> str:
     if not option.endswith(".toml"):
         refuse("preset", option, _ALLOWED)
     try:
-        description = description_of(Path(option).read_text(encoding="utf-8"))
+        description = description_of(Path(option).read_text(encoding="utf-8-sig"), also=(_SET,))
         if (environment := description.pop("environment", "target")) != "target":
             refuse("environment", environment, "'target', from which the source follows")
-        preset = text_of(description)
+        preset = preset_text(description, description.pop(_SET, {}))
         check_preset(preset)
     except ValueError as error:
         raise ValueError(f"preset: {option}: {error}") from error
     return preset
+
+
+def preset_text(description: dict[str, Any], own: dict[str, Any]) -> str:
+    """The text of a file: what differs from the paper's environments, and numbers by their path."""
+    if not isinstance(own, dict) or not all(isinstance(value, str | int | float) for value in own.values()):
+        refuse(_SET, str(own), 'a table of numbers and names by path, such as "hparams.learning_rate" = 3e-5')
+    lines = [f"{json.dumps(path)} = {json.dumps(value)}" for path, value in own.items()]
+    return text_of(description) + "\n".join(["", f"[{_SET}]", *lines, ""] * bool(own))
 
 
 def check_preset(preset: str) -> None:
@@ -64,14 +93,67 @@ def check_preset(preset: str) -> None:
             refuse("preset", found, f"the paper's, {paper.shape} and {paper.num_actions}, that the figures are about")
 
 
+class Base(NamedTuple):
+    """What a sweep's points differ from."""
+
+    points: Points
+    """One environment with hyperparameters, without a leading axis."""
+    config: Config
+    """Static settings, but for those that the size of a run decides."""
+
+
+@lru_cache
+def base_of(environment: str, preset: str) -> Base:
+    """What points in an environment differ from.
+
+    Args:
+      environment: "source" or "target" of the preset, or the text of a file that `jrcjax.load_params` reads.
+      preset: see `preset_of`.
+
+    Raises:
+      ValueError: naming the field, the value and what is allowed.
+    """
+    if environment in ENVIRONMENTS:
+        params = paper_params(environment, preset) if preset in PRESETS else _of_file(environment, preset)
+    else:
+        params = from_toml(environment)
+    base, own = Base(Points(params, HParams()), Config()), set_in(preset)
+    setting = own.pop("source", SOURCES[0])
+    if setting not in SOURCES:
+        refuse("source", str(setting), ", ".join(SOURCES))
+    if environment == "source" and setting == "table1":
+        own = {path: value for path, value in own.items() if path.startswith("env.")}
+    return with_set(base, own)
+
+
+def set_in(preset: str) -> dict[str, Any]:
+    """The numbers and names that a preset sets by their path."""
+    return {} if preset in PRESETS else dict(description_of(preset, also=(_SET,)).get(_SET, {}))
+
+
+def with_set(base: Base, own: dict[str, Any]) -> Base:
+    """A base with single numbers set by their path, each a number or the name of a reading."""
+    if not own:
+        return base
+    columns = []
+    for path, value in own.items():
+        parameter = parameter_at(path, base.points)
+        if any(parameter.overlaps(column.parameter) for column in columns):
+            refuse(_SET, path, "numbers that do not overlap")
+        columns.append(Values(parameter, np.array([parameter.value_of(str(value))])))
+    points = jax.tree.map(lambda leaf: leaf[0], stacked(base.points, columns, 1))
+    return Base(points, settings(base.config, columns, 1)[0])
+
+
 def environment_of(name: str, preset: str) -> EnvParams:
     """The source or target environment of a preset."""
-    return paper_params(name, preset) if preset in PRESETS else _of_file(name, preset)
+    return base_of(name, preset).points.params
 
 
 @lru_cache
 def _of_file(name: str, text: str) -> EnvParams:
-    description: dict[str, Any] = {"environment": name} | description_of(text)
+    description: dict[str, Any] = {"environment": name} | description_of(text, also=(_SET,))
+    description.pop(_SET, None)
     if "radar" in description:
         description["radar"] = _radar(name, dict(description["radar"]))
     return params_of(description)

@@ -2,57 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass, field, replace
 
 from jrcjax.checks import require_integer
-from jrcjax.learners.hparams import Config, HParams
-from jrcjax.model.params import EnvParams
+from jrcjax.learners.hparams import Config
 from jrcjax.model.presets import PRESETS
 from jrcjax.types import choice
+from sweeps.design import Design
 from sweeps.preset import check_preset, label_of
 
 MOST_SEEDS = 1_000_000
-"""Whose numbers fit the names of parts."""
+"""The most whose numbers fit the names of parts."""
 _MOST_EPISODES = 100_000  # whose log of a part still fits the memory, and whose slots 32 bits
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """The constants of one sweep; its points differ in numbers alone, never in shapes."""
+    """The constants of one sweep."""
 
     name: str
     description: str
     learners: tuple[str, ...]
-    x_name: str
-    """What varies between points."""
-    x_values: tuple[float, ...]
-    """Its value at each point."""
-    params_at: Callable[[float, str], EnvParams]
-    """(x, preset) to the environment at a point."""
-    hparams_at: Callable[[float], HParams] = lambda x: HParams()
-    """x to the hyperparameters at a point."""
+    environment: str = "target"
+    """What points differ from: "source" or "target" of the preset, or the text of a TOML file."""
+    design: Design = field(default_factory=Design)
+    """The points. Those that differ in numbers alone share one program."""
+    fixed: tuple[tuple[str, float], ...] = ()
+    """Numbers by path that differ from the base, the same at all points."""
     source: Sweep | None = None
     """What trains the source agents whose weights and demonstrations the learners take over: at each of its points,
     one per seed."""
     source_points: tuple[int, ...] = ()
     """Number of the source's point at each point; the first everywhere if empty."""
-    optimiser: str = Config.optimiser  # pyright: ignore[reportAssignmentType]
-    """One of jrcjax.learners.hparams.OPTIMISERS, of the learners and of the source agents' sweep alike."""
-    recipe: Any = None
-    """What a sweep of one's own is made from (`sweeps.studies.custom.Options`), so that its results can be verified."""
+    hands_on: bool = False
+    """Whether its Double DQN agents are source agents, whose weights and demonstrations are kept."""
+    own: bool = False
+    """Whether it is made for one command, so that its results alone tell what it is."""
     seeds_per_part: int = 16
     """Seeds that share a part file. With few points more of them fill the blocks that devices work on."""
-
-    def config(self, size: Size) -> Config:
-        """Static settings of all learners."""
-        return Config(
-            episodes=size.episodes,
-            pretraining=size.pretraining,
-            demonstrations=size.demonstrations,
-            optimiser=self.optimiser,
-        )
 
 
 @dataclass(frozen=True)
@@ -97,6 +84,13 @@ class Study:
     smoke_sweeps: tuple[Sweep, ...] | None = None
     """What the tiny version runs instead of `sweeps`."""
     smoke_size: Size = SMOKE
+    summary: str = ""
+    """What draws conclusions from the results, as module:function of a layer above; found by name after the run. It
+    takes the sweeps, the size and the folder of results, and returns the files that it wrote."""
+
+    def with_sweeps(self, sweeps: tuple[Sweep, ...]) -> Study:
+        """The same study of these sweeps, in its tiny version, too."""
+        return replace(self, sweeps=sweeps, smoke_sweeps=sweeps)
 
 
 def size_of(seeds: int | None, episodes: int | None, preset: str, smoke: bool, study: Study | None = None) -> Size:

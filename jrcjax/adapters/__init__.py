@@ -3,11 +3,18 @@
 | for | take | needs |
 |---|---|---|
 | Gymnasium, Stable-Baselines3 | `GymnasiumEnv`, or `gymnasium.make("jrcjax/JRC-target-v0")` | gymnasium |
+| Gymnasium, many at once | `VectorEnv`, or `gymnasium.make_vec("jrcjax/JRC-target-v0", num_envs=64)` | gymnasium |
+| Stable-Baselines3, many at once | `SB3VecEnv` | stable_baselines3 |
 | gymnax 1.0 and its wrappers | `GymnaxEnv` | gymnax |
-| rejax, PureJaxRL | `FiveTupleEnv` | gymnax |
+| rejax, PureJaxRL and others that unpack five values from `step` | `FiveTupleEnv` | gymnax |
 
-Where Gymnasium is installed, importing this package registers `jrcjax/JRC-source-v0` and `jrcjax/JRC-target-v0`. It can
-be imported without any of the libraries.
+Where Gymnasium is installed, importing this package registers `jrcjax/JRC-source-v0` and `jrcjax/JRC-target-v0`, whose
+episodes have at most 300 slots, and `jrcjax/JRC-v0`, whose episodes are as long as its parameters say. All take
+`params=`. A process that has not imported it takes "jrcjax.adapters:jrcjax/JRC-target-v0". The package can be imported
+without any of the libraries.
+
+In a process forked from one that has run JAX, an environment works if its parent made one with equal parameters;
+otherwise it is refused. Start other workers by "spawn" or "forkserver".
 """
 
 from __future__ import annotations

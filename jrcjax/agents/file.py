@@ -6,11 +6,9 @@ single run is one of each. What training alone needs, replay memories and optimi
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
-import json
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,26 +16,21 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jrcjax.agents import layout
 from jrcjax.agents.saved_agent import SavedAgent
-from jrcjax.checks import refuse, require_type
-from jrcjax.files import write_whole
-from jrcjax.learners import LEARNERS, Spec
-from jrcjax.learners.hparams import Config, HParams
+from jrcjax.checks import refuse, require, require_type
+from jrcjax.files import DamagedFile, write_whole
+from jrcjax.learners import Spec
+from jrcjax.learners.hparams import Config, HParams, check_hparams
 from jrcjax.learners.q_function import q_function
 from jrcjax.model import states
-from jrcjax.model.params import EnvParams
+from jrcjax.model.params import EnvParams, check_params
 from jrcjax.named import container_of, named_arrays, named_settings
 from jrcjax.provenance import provenance
 from jrcjax.training.rollout import AgentState, spec_of
 from jrcjax.types import Key, choice
 
-VERSION = 2
-"""Of the files' layout."""
-ABOUT = "jrcjax agents"
-"""Key of the metadata under which a file says what it holds."""
-_OPTAX = "optax"  # an optimiser that had no name
-LEARNING = tuple(name for name in LEARNERS if name != "round_robin")
-"""Learners that have something to save."""
+LEARNING = layout.LEARNING
 
 
 def save_agent(
@@ -97,12 +90,12 @@ def save_agents(
     tensors |= {f"hparams.{name}": leaf for name, leaf in named_arrays(hparams).items()}
     points = hparams.discount.shape[0]
     for learner, agent in agents.items():
-        choice("learner", learner, LEARNING)
+        choice("learner", learner, layout.LEARNING)
         _check_values(learner, agent.learner, spec_of(env_params), config, (points, len(seeds)))
         named = named_arrays(agent.learner) | {"key": jax.random.key_data(_typed(agent.key))}
         tensors |= {f"agents.{learner}.{name}": leaf for name, leaf in named.items()}
     about = {
-        "version": VERSION,
+        "version": layout.VERSION,
         "learners": list(agents),
         "points": points,
         "seeds": [int(seed) for seed in seeds],
@@ -111,7 +104,8 @@ def save_agents(
         "key_implementation": str(jax.random.key_impl(_typed(next(iter(agents.values())).key))),
         "provenance": provenance(),
     }
-    return _write(Path(path), {name: np.asarray(leaf) for name, leaf in tensors.items()}, about)
+    write_whole(Path(path), layout.content_of({name: np.asarray(leaf) for name, leaf in tensors.items()}, about))
+    return Path(path)
 
 
 def load_agent(
@@ -127,20 +121,35 @@ def load_agent(
 
     Raises:
       FileNotFoundError: if there is no such file.
-      ValueError: if it is no file of agents, damaged or of another version, or has no such agent.
+      ValueError: naming the file, the field, the value and what is allowed, if it is no file of agents, if a bit of it
+        is not as it was written, if it is of another version, if the agent diverged, or if there is no such agent.
     """
-    with opened(path) as (file, about):
-        name = _chosen("learner", learner, about["learners"])
-        x = _chosen("point", point, list(range(about["points"])))
-        number = _chosen("seed", seed, about["seeds"])
-        params, hparams = (_read(file, prefix, (x,)) for prefix in ("params.", "hparams."))
-        agent = _unnamed(_read(file, f"agents.{name}.", (x, about["seeds"].index(number))))
-    key = jax.random.wrap_key_data(agent.pop("key"), impl=about["key_implementation"])
-    config = Config(**about["config"] | {"hidden": tuple(about["config"]["hidden"])})
-    environment = _environment(params, about["settings"])
-    _check_values(name, agent, spec_of(environment), config, ())
-    learned_with = HParams(**{field: jnp.asarray(leaf) for field, leaf in hparams.items()})
-    return SavedAgent(name, environment, learned_with, config, key, agent, x, number, about["provenance"])
+    try:
+        return _loaded(Path(path), learner, point, seed)
+    except (ValueError, DamagedFile) as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def _loaded(path: Path, learner: str | None, point: int | None, seed: int | None) -> SavedAgent:
+    file = layout.read(path)
+    layout.check(file)
+    about = file.about
+    name = _chosen("learner", learner, about["learners"])
+    x = _chosen("point", point, range(about["points"]))
+    number = _chosen("seed", seed, about["seeds"])
+    config = layout.config_of(about)
+    environment = container_of(EnvParams, _part(file, "params.", (x,)), layout.settings_of(about))
+    hparams = HParams(**_part(file, "hparams.", (x,)))
+    check_params(environment)
+    check_hparams(hparams)
+    values = _part(file, f"agents.{name}.", (x, about["seeds"].index(number)))
+    key = jax.random.wrap_key_data(values.pop("key"), impl=about["key_implementation"])
+    _check_values(name, values, spec_of(environment), config, ())
+    finite = "finite numbers, of an agent that did not diverge"
+    for part, leaf in values.items():
+        require(f"agents.{name}.{part}", leaf, leaf.shape, lambda x: True, finite)
+    layout.check_seal(file)
+    return SavedAgent(name, environment, hparams, config, key, _unnamed(values), x, number, about["provenance"])
 
 
 def acting_part(learner_state: Any) -> dict[str, Any]:
@@ -155,7 +164,7 @@ def _typed(key: Key) -> Key:
 
 def _plain_config(config: Config) -> dict[str, Any]:
     fields = {field.name: getattr(config, field.name) for field in dataclasses.fields(config)}
-    return fields | {"optimiser": config.optimiser if isinstance(config.optimiser, str) else _OPTAX}
+    return fields | {"optimiser": config.optimiser if isinstance(config.optimiser, str) else layout.OPTAX}
 
 
 def _check_values(learner: str, values: dict[str, Any], spec: Spec, config: Config, leading: tuple[int, ...]) -> None:
@@ -172,7 +181,13 @@ def _check_values(learner: str, values: dict[str, Any], spec: Spec, config: Conf
         )
 
 
-def _unnamed(leaves: dict[str, np.ndarray]) -> dict[str, Any]:
+def _part(file: layout.File, prefix: str, place: tuple[int, ...]) -> dict[str, jax.Array]:
+    """One entry along the leading axes of every tensor whose name has this prefix, by the rest of its name."""
+    named = {name: tensor for name, tensor in file.tensors.items() if name.startswith(prefix)}
+    return {name.removeprefix(prefix): jnp.asarray(tensor[place]) for name, tensor in named.items()}
+
+
+def _unnamed(leaves: dict[str, jax.Array]) -> dict[str, Any]:
     """The nested dictionary of leaves with dotted paths."""
     tree: dict[str, Any] = {}
     for name, leaf in leaves.items():
@@ -180,59 +195,14 @@ def _unnamed(leaves: dict[str, np.ndarray]) -> dict[str, Any]:
         inner = tree
         for part in outer:
             inner = inner.setdefault(part, {})
-        inner[last] = jnp.asarray(leaf)
+        inner[last] = leaf
     return tree
 
 
-def _environment(arrays: dict[str, np.ndarray], settings: dict[str, Any]) -> EnvParams:
-    """Environment parameters from their leaves and what is static of them, which JSON gives as lists."""
-    statics = {name: tuple(value) if isinstance(value, list) else value for name, value in settings.items()}
-    return container_of(EnvParams, {name: jnp.asarray(leaf) for name, leaf in arrays.items()}, statics)
-
-
-def _read(file: Any, prefix: str, place: tuple[int, ...]) -> dict[str, np.ndarray]:
-    """One entry along the leading axes of every tensor whose name has this prefix, by the rest of its name."""
-    slices = tuple(slice(i, i + 1) for i in place)
-    names = [name for name in file.keys() if name.startswith(prefix)]  # noqa: SIM118 - not a mapping
-    return {name.removeprefix(prefix): file.get_slice(name)[slices][(0,) * len(place)] for name in names}
-
-
-@contextlib.contextmanager
-def opened(path: str | os.PathLike) -> Iterator[tuple[Any, dict[str, Any]]]:
-    """An open file of agents, and what it says of itself.
-
-    Raises:
-      FileNotFoundError: if there is no such file.
-      ValueError: if it is no file of agents, damaged or of another version.
-    """
-    from safetensors import SafetensorError, safe_open  # here, since importing the package needs it for nothing else
-
-    try:
-        with safe_open(path, "numpy") as file:
-            metadata = file.metadata() or {}
-            if ABOUT not in metadata:
-                raise ValueError(f"{path}: a safetensors file without agents; allowed: one that save_agent wrote")
-            about = json.loads(metadata[ABOUT])
-            if about["version"] != VERSION:
-                raise ValueError(f"{path}: version {about['version']}; allowed: {VERSION}, which this jrcjax reads")
-            yield file, about
-    except SafetensorError as error:
-        raise ValueError(f"{path}: damaged, or not a file that save_agent wrote ({error})") from None
-
-
-def _chosen(field: str, value: Any, there: list[Any]) -> Any:
+def _chosen(field: str, value: Any, there: Sequence[Any]) -> Any:
     if value is None and len(there) == 1:
         return there[0]
-    if value not in there:
+    if isinstance(value, bool) or value not in there:
         numbers = f"one of {there[0]} to {there[-1]}" if len(there) > 8 else f"one of {', '.join(map(repr, there))}"
-        refuse(field, "None" if value is None else value, f"{numbers}, which the file holds")
+        refuse(field, "None" if value is None else str(value), f"{numbers}, which the file holds")
     return value
-
-
-def _write(path: Path, tensors: dict[str, np.ndarray], about: dict[str, Any]) -> Path:
-    """Writes a file, whole or not at all."""
-    from safetensors.numpy import save
-
-    content = save({name: np.ascontiguousarray(array) for name, array in tensors.items()}, {ABOUT: json.dumps(about)})
-    write_whole(path, content)
-    return path

@@ -1,8 +1,9 @@
-"""Numbers of an environment and of the hyperparameters by dotted path, such as env.speed.event_probability.high.
+"""Numbers of an environment, of the hyperparameters and of the settings by dotted path.
 
-A path follows the fields of `EnvParams` (after env) or of `HParams` (after hparams) and ends with an index for each
-axis of an array. Where factors have two levels, and channels two rates, low and high are the indices 0 and 1. In place
-of a factor, `all` stands for every factor that has the field.
+A path such as env.speed.event_probability.high follows the fields of `EnvParams` (after env), of `HParams` (after
+hparams) or of `Config` (after config), and ends with an index for each axis of an array. Where factors have two levels,
+and channels two rates, low and high are the indices 0 and 1. In place of a factor, `all` stands for every factor that
+has the field.
 """
 
 from __future__ import annotations
@@ -10,29 +11,31 @@ from __future__ import annotations
 import dataclasses
 from typing import Any, NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jrcjax.checks import refuse
 from jrcjax.containers import Container, Kind, schema_of
-from jrcjax.learners.hparams import HParams
+from jrcjax.learners.hparams import FORMS, OPTIMISERS, Config, HParams
 from jrcjax.model.params import FACTORS, EnvParams
 from jrcjax.named import field_at
 from jrcjax.types import INITIAL_WEIGHTS
 
 
 class Points(NamedTuple):
-    """What differs between points, every leaf with a leading axis of points."""
+    """What differs between points: of one point, or with a leading axis of points on every leaf."""
 
     params: EnvParams
     hparams: HParams
 
 
-_ROOTS = {"env": "params", "hparams": "hparams"}
+_ROOTS = {"env": "params", "hparams": "hparams", "config": "config"}
 _READINGS = {"initial_weights": INITIAL_WEIGHTS}
-_DISTRIBUTIONS = ("prior", "class_share")
+DISTRIBUTIONS = ("prior", "class_share")
+"""Fields whose entries sum to 1."""
 _LOW_AND_HIGH = ("prior", "event_probability", "interference", "packets", "sinr_threshold")
+_STATIC_READINGS = {"optimiser": OPTIMISERS, "form": FORMS}
+_SHARED = ("episodes", "demonstrations")  # dimensions of results, the same at all points
 _MOST_VALUES = 1000
 
 
@@ -43,24 +46,36 @@ class Entry(NamedTuple):
     index: tuple[int, ...]
 
 
+class Range(NamedTuple):
+    """What a sample of a parameter is drawn from."""
+
+    low: float
+    high: float
+    is_log: bool = False
+    levels: tuple[float, ...] = ()
+    """The values themselves, if they are a list; then `low` and `high` say nothing."""
+
+
 class Parameter(NamedTuple):
     """One number, or the same number of all factors."""
 
     path: str
     container: str
-    """Field of `Points` that it is in."""
+    """Field of `Points` that it is in, or config."""
     entries: tuple[Entry, ...]
     readings: tuple[str, ...]
     """Names of its values, if it is the index of a reading."""
     is_whole: bool
     """Whether it is an integer."""
 
-    def set_in(self, point: Points, value: float) -> Points:
-        """A copy of a point with this value; the other entries of a distribution keep their proportions."""
-        changed = getattr(point, self.container)
-        for entry in self.entries:
-            changed = _replaced(changed, entry.fields, entry.index, value)
-        return point._replace(**{self.container: changed})
+    def overlaps(self, other: Parameter) -> bool:
+        """Whether setting one may change the other, as entries of one distribution do."""
+
+        def touched(parameter: Parameter) -> set:
+            kept = ((e.fields, () if e.fields[-1] in DISTRIBUTIONS else e.index) for e in parameter.entries)
+            return {(parameter.container, *entry) for entry in kept}
+
+        return bool(touched(self) & touched(other))
 
     def value_of(self, text: str) -> float:
         """The number that `text` stands for, or the index of the reading of that name.
@@ -78,6 +93,11 @@ class Parameter(NamedTuple):
             refuse(self.path, text, ", ".join(self.readings))
         if not np.isfinite(value) or (self.is_whole and value != int(value)):
             refuse(self.path, text, "an integer" if self.is_whole else "a finite number")
+        held = np.float32(value) if abs(value) <= np.finfo(np.float32).max else np.inf
+        if (self.is_whole and abs(value) >= 2**31) or not np.isfinite(held) or (held == 0) != (value == 0):
+            refuse(
+                self.path, text, f"a number that fits {'32 bits' if self.is_whole else 'float32, and is not 0 in it'}"
+            )
         return value
 
     def text_of(self, value: float) -> str:
@@ -91,8 +111,8 @@ class Parameter(NamedTuple):
           ValueError: naming the path, the text and what is allowed.
         """
         values = self._spread(text) if ":" in text else [self.value_of(part.strip()) for part in text.split(",")]
-        if len(set(values)) < len(values):
-            refuse(self.path, text, "values that differ")
+        if len(set(np.asarray(values, np.int64 if self.is_whole else np.float32).tolist())) < len(values):
+            refuse(self.path, text, "values that differ" if self.is_whole else "values that differ in float32")
         return tuple(sorted(values))
 
     def _spread(self, text: str) -> list[float]:
@@ -107,6 +127,22 @@ class Parameter(NamedTuple):
         # As a person would write it: 0.3, where the sum of tenths gives 0.30000000000000004.
         return [self.value_of(f"{value:.10g}") for value in spread(*ends, int(count))]
 
+    def range_of(self, text: str) -> Range:
+        """The range that `text` stands for: low:high, low:high:log, or a list a,b,c of values to choose from.
+
+        Raises:
+          ValueError: naming the path, the text and what is allowed.
+        """
+        if ":" not in text:
+            return Range(0.0, 0.0, levels=self.values_of(text))
+        low, high, *scale = text.split(":")
+        if self.readings or scale not in ([], ["log"]):
+            refuse(self.path, text, ", ".join(self.readings) or "low:high, low:high:log, or a list a,b,c")
+        ends = self.value_of(low), self.value_of(high)
+        if not ends[0] < ends[1] or (scale and ends[0] <= 0):
+            refuse(self.path, text, "low < high" + ", both > 0 on a logarithmic scale" * bool(scale))
+        return Range(*ends, is_log=bool(scale))
+
 
 def parameter_at(path: str, point: Points) -> Parameter:
     """The parameter at a path, in containers of the shapes of `point`.
@@ -116,23 +152,38 @@ def parameter_at(path: str, point: Points) -> Parameter:
     """
     root, *parts = path.split(".")
     if root not in _ROOTS:
-        hint = "; the fields of Config decide shapes and code, which all points share" if root == "config" else ""
-        refuse(path, root, f"{' or '.join(_ROOTS)} before the first dot{hint}")
+        refuse(path, root, f"{', '.join(_ROOTS)} before the first dot")
+    if root == "config":
+        return _setting(path, parts)
     container = getattr(point, _ROOTS[root])
     starts = [parts]
     if root == "env" and parts[:1] == ["all"]:
         field = _take(path, parts, 1, _fields_of(container.road))
         starts = [[name, *parts[1:]] for name in FACTORS if hasattr(getattr(container, name), field)]
     entries = tuple(_entry(path, start, container) for start in starts)
-    leaf = _leaf(container, entries[0])
-    is_whole = jnp.issubdtype(leaf.dtype, jnp.integer)
+    is_whole = jnp.issubdtype(leaf_of(container, entries[0]).dtype, jnp.integer)
     return Parameter(path, _ROOTS[root], entries, _readings_of(container, entries[0].fields), is_whole)
 
 
-def _leaf(container: Any, entry: Entry) -> jax.Array:
+def leaf_of(container: Any, entry: Entry) -> Any:
+    """The array that holds a number."""
     for name in entry.fields:
         container = getattr(container, name)
     return container
+
+
+def _setting(path: str, parts: list[str]) -> Parameter:
+    """A field of `Config`, which decides shapes or code: points that differ in it are programs of their own."""
+    defaults = {field.name: getattr(Config(), field.name) for field in dataclasses.fields(Config)}
+    allowed = [
+        name
+        for name, value in defaults.items()
+        if name not in _SHARED and (name in _STATIC_READINGS or type(value) is int)
+    ]
+    name = _take(path, parts, 0, allowed)
+    if len(parts) > 1:
+        refuse(path, parts[-1], f"nothing more, config.{name} is a number or a name")
+    return Parameter(path, "config", (Entry((name,), ()),), _STATIC_READINGS.get(name, ()), True)
 
 
 def _entry(path: str, parts: list[str], container: Any) -> Entry:
@@ -189,21 +240,3 @@ def _take(path: str, parts: list[str], position: int, allowed: list[str]) -> str
     before = ".".join(given[: len(given) - len(parts) + position]) if len(given) > position else path
     found = parts[position] if position < len(parts) else ""
     refuse(path, found, f"after {before} one of {', '.join(allowed)}")
-
-
-def _replaced(container: Any, fields: tuple[str, ...], index: tuple[int, ...], value: float) -> Any:
-    name, *rest = fields
-    old = getattr(container, name)
-    new = _replaced(old, tuple(rest), index, value) if rest else _changed(name, old, index, value)
-    return container.replace(**{name: new})  # of a radar, with the bank that fits
-
-
-def _changed(name: str, array: jax.Array, index: tuple[int, ...], value: float) -> jax.Array:
-    changed = np.array(array)
-    if name in _DISTRIBUTIONS:
-        others = np.arange(changed.size) != index[0]
-        kept = changed[others].astype(np.float64)
-        shares = kept / kept.sum() if kept.sum() > 0 else np.full(kept.size, 1 / max(kept.size, 1))
-        changed[others] = (1.0 - value) * shares
-    changed[index] = value
-    return jnp.asarray(changed)

@@ -54,7 +54,7 @@ def load_params(path: str | Path) -> EnvParams:
       OSError: if the file can't be read.
     """
     try:
-        return from_toml(Path(path).read_text(encoding="utf-8"))
+        return from_toml(Path(path).read_text(encoding="utf-8-sig"))
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from error
 
@@ -75,13 +75,22 @@ def from_toml(text: str) -> EnvParams:
     return params_of(description_of(text))
 
 
-def description_of(text: str) -> Description:
+def description_of(text: str, also: tuple[str, ...] = ()) -> Description:
     """What the text of a file says, key by key and table by table.
+
+    Args:
+      text: of the file.
+      also: names of further keys, whose values the caller checks.
 
     Raises:
       ValueError: for keys that are unknown and values of the wrong kind, naming them and what is allowed.
     """
-    return _checked(tomllib.loads(text))
+    try:
+        given = tomllib.loads(text)
+        others = {name: given.pop(name) for name in also if name in given}
+        return _checked(given) | others
+    except RecursionError:
+        raise ValueError("nested too deeply; allowed: the tables and lists that save_params writes") from None
 
 
 def params_of(description: Description) -> EnvParams:

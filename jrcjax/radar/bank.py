@@ -24,6 +24,7 @@ from jrcjax.types import Key, Words
 
 PLACEMENTS = ("bank", "fresh")
 _CHUNK = 256  # placements handled at once while a bank is built: about 10 MB of boxes
+_MOST_PLACED = 2**28  # objects in all placements of a bank: about a minute of work
 _KNOWN_BANKS = 256  # a bank of two modes takes 32 kB
 
 
@@ -79,6 +80,9 @@ def bank_key(seed: Int[Array, ""], mode: int | Int[Array, ""], i: Int[Array, ""]
 def bank_of(modes: Modes, seed: Int[Array, ""], size: int) -> Float[Array, "K B"]:
     """Miss ratios of `size` independent placements per mode; where all numbers are known, made once and kept."""
     leaves = jax.tree.leaves((modes, seed))
+    if size * sum(modes.max_objects) > _MOST_PLACED:
+        allowed = f"at most {_MOST_PLACED // sum(modes.max_objects)} placements of {modes.max_objects} objects"
+        refuse("radar.bank_size", size, allowed)
     if is_traced(*leaves):
         return _build(modes, seed, size)
     content = tuple((np.asarray(leaf).tobytes(), leaf.shape) for leaf in leaves)

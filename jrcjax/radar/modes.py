@@ -15,6 +15,7 @@ from jrcjax.containers import (
     DISTRIBUTION,
     NOT_NEGATIVE,
     POSITIVE,
+    Allowed,
     Container,
     number,
     reading,
@@ -29,17 +30,23 @@ REFERENCE_SIDE = 45.0
 """Side in m of the square in which the density omega counts objects."""
 
 
+MOST_OBJECTS = 100_000
+"""Mean number of objects in a mode's square, at most: some GB while a bank is built."""
+_MOST_SLOTS = 2 * MOST_OBJECTS
+_BANDWIDTHS = Allowed(lambda x: (x >= 1e3) & (x <= 1e15), "from 1e3 to 1e15")  # range cells of 150 km to 0.15 um
+
+
 def _check_max_objects(field: str, value: object) -> None:
     if value is None:
         return
-    if not isinstance(value, tuple) or not all(type(slots) is int and slots >= 1 for slots in value):
-        refuse(field, str(value), "a tuple of integers >= 1, one per radar mode")
+    if not isinstance(value, tuple) or not all(type(slots) is int and 1 <= slots <= _MOST_SLOTS for slots in value):
+        refuse(field, str(value), f"a tuple of integers from 1 to {_MOST_SLOTS}, one per radar mode")
 
 
 class Modes(Container):
     """K radar modes and the objects around the vehicle: all that the miss ratio of a placement depends on."""
 
-    bandwidth: Float[Array, " K"] = number(POSITIVE, "Hz")
+    bandwidth: Float[Array, " K"] = number(_BANDWIDTHS, "Hz")
     """Sweep bandwidth b of each mode."""
     slope: Float[Array, " K"] = number(POSITIVE, "Hz/s")
     """Chirp slope f_c of each mode."""
@@ -126,6 +133,10 @@ def room_for(modes: Modes, scale: float = 1.0) -> tuple[int, ...]:
             refuse("radar.max_objects", "None", "a tuple of integers where the density has no value yet")
         return at_least
     mean = known_mean_count(modes) * scale
+    if not (mean <= MOST_OBJECTS).all():
+        field, density = ("radar.max_density", scale) if scale > 1.0 else ("radar.density", 1.0)
+        allowed = f"at most {MOST_OBJECTS} objects in a mode's square, not {mean.tolist()}"
+        refuse(field, density * float(modes.density), allowed)
     needed = [math.ceil(m + 8.0 * math.sqrt(m) + 8.0) for m in mean]
     return tuple(max(pair) for pair in zip(needed, at_least or needed, strict=True))
 

@@ -16,6 +16,7 @@ import xarray as xr
 
 from jrcjax import exact, front
 from jrcjax.config.paths import Points, parameter_at
+from jrcjax.config.stacking import with_value
 from jrcjax.learners.hparams import HParams
 from jrcjax.model.params import EnvParams
 from jrcjax.readings import MissConvention
@@ -100,7 +101,7 @@ def table(params: EnvParams, data: xr.Dataset) -> pd.DataFrame:
     for panel, (path, values) in VARIED.items():
         varied = parameter_at(path, point)
         for value in values:
-            for moved in _conventions(varied.set_in(point, value).params):
+            for moved in _conventions(with_value(point, varied, value).params):
                 rows += front_rows(panel, moved, value)
     return pd.DataFrame(rows, columns=list(COLUMNS))
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import tyro
 from rich.console import Console
 
+from sweeps.command import undisturbed
 from sweeps.options import FLAGS, Folder
 
 _SMOKE_STUDIES = 200
@@ -27,6 +28,7 @@ class Options:
 def main(args: list[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     options = tyro.cli(Options, prog="python -m paper_figs.calibration", args=args, config=FLAGS)
+    undisturbed()
     from paper_figs.calibration import draw, simulate
     from paper_figs.plots import style
 
@@ -38,8 +40,10 @@ def main(args: list[str] | None = None) -> int:
             found.append(row)
             console.print(_line(row), markup=False, highlight=False, soft_wrap=True)
         numbers = simulate.table(found)
-        numbers.to_csv(out / "calibration.csv", index=False, float_format="%.6g")
-        files = [out / "calibration.csv", *style.save(draw.draw(numbers), out / "calibration")]
+        files = [
+            style.save_table(numbers, out / "calibration.csv"),
+            *style.save(draw.draw(numbers), out / "calibration"),
+        ]
     except OSError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

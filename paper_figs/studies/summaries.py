@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
 
 from jrcjax.files import write_text
 from paper_figs.plots import style
-from paper_figs.studies import multiverse, robustness
+from paper_figs.studies import robustness
 from sweeps.preset import slots_of
 from sweeps.results import store
-from sweeps.studies.multiverse import LEVELS, MULTIVERSE, UNIVERSES, grouped
 from sweeps.studies.robustness import SOURCE, TARGET
 from sweeps.sweep import Size, Sweep
-
-HEADLINE = "C5 (highest)"
-"""The claim whose specification curve is drawn as a picture of its own."""
 
 
 def _write(folder: Path, tables: dict[str, pd.DataFrame]) -> list[Path]:
@@ -42,35 +37,3 @@ def summarise_robustness(sweeps: tuple[Sweep, ...], size: Size, out: Path) -> li
     tables = robustness.tables(results, slots_of(size.preset))
     pictures = style.save(robustness.draw(tables), folder / "robustness")
     return [*_write(folder, tables), *pictures, _manifests(folder, sweeps, out)]
-
-
-def summarise_multiverse(sweeps: tuple[Sweep, ...], size: Size, out: Path) -> list[Path]:
-    """Tables and figures of a multiverse, in OUT/multiverse/summary; specifications.pdf has a page per claim."""
-    folder = out / "multiverse" / "summary"
-    folder.mkdir(parents=True, exist_ok=True)
-    results, universes = {}, {}
-    for sweep in sweeps:
-        assert sweep.source
-        results[sweep.name] = tuple(store.load(out / part.name, size.seeds) for part in (sweep.source, sweep))
-        universes[sweep.name] = grouped(UNIVERSES)[sweep.optimiser][: len(sweep.source.x_values)]
-    found = multiverse.verdicts(results, universes)
-    effects = multiverse.main_effects(found)
-    shares = multiverse.shares(found, effects)
-    tables = {
-        "universes": found[["universe", *LEVELS]].drop_duplicates(),
-        "verdicts": found.drop(columns=[*LEVELS, "relation", "limit"]),
-        "main_effects": effects,
-        "claims": shares,
-    }
-    pictures = style.save(multiverse.draw_shares(shares, size.seeds), folder / "multiverse")
-    pictures += style.save(multiverse.draw_specification(found, HEADLINE), folder / "specification")
-    pages = (multiverse.draw_specification(found, claim) for claim in shares.claim)
-    pictures.append(style.save_pages(pages, folder / "specifications.pdf"))
-    return [*_write(folder, tables), *pictures, _manifests(folder, sweeps, out)]
-
-
-SUMMARIES: dict[str, Callable[[tuple[Sweep, ...], Size, Path], list[Path]]] = {
-    "robustness": summarise_robustness,
-    MULTIVERSE.name: summarise_multiverse,
-}
-"""By the name of the study."""

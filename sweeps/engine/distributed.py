@@ -10,13 +10,13 @@ from __future__ import annotations
 import functools
 import os
 import re
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 
@@ -25,11 +25,10 @@ from jrcjax.checks import refuse, require_integer
 from jrcjax.learners import Source
 from jrcjax.provenance import command, working_for
 from jrcjax.training import parallel
-from sweeps.engine import sources
-from sweeps.engine.program import points_of, reference_of
-from sweeps.engine.run import quiet, results_of
+from sweeps.engine.block import Block, compute, source_in
+from sweeps.engine.job import Job
+from sweeps.engine.sources import kept_sources, missing_sources
 from sweeps.results import store
-from sweeps.results.agents import agents_path, write_agents
 from sweeps.sweep import Size, Sweep
 
 _LOST_WORKERS = 10  # that one block may have before the run gives up
@@ -72,44 +71,37 @@ def client_of(scheduler: str | None, workers: int | None) -> Iterator[Any]:
         yield client
 
 
-def run_blocks(
-    client: Any, sweep: Sweep, size: Size, out: Path, todo: list[range], save_agents: bool = False
-) -> Iterator[range]:
-    """Runs blocks of seeds on a cluster and writes their parts, and those of source agents, as they come in.
+def compute_blocks(client: Any, job: Job, out: Path, todo: list[range]) -> Iterator[Block]:
+    """Computes blocks of seeds on a cluster, and keeps the source agents that workers had to train.
 
     Args:
       client: of the cluster.
-      sweep: what to run.
-      size: how much of it.
+      job: what to run.
       out: the folder with the results of all sweeps.
       todo: the blocks.
-      save_agents: save the trained agents beside the parts.
 
     Yields:
-      Each block, when its part is written.
+      The blocks as they come in.
     """
     from distributed import as_completed
 
-    blocks = {}
     share_of = len(client.cluster.workers) if client.cluster else None  # those of this machine share its cores
+    tasks = []
     for seeds in todo:
         source = None
-        if sweep.source and not sources.missing_sources(sweep.source, size, seeds, out):
-            kept = sources.sources_of(sweep.source, size, seeds, out, quiet)
-            source = client.scatter(jax.tree.map(np.asarray, kept))
-        asked = _Asked(sweep, size, seeds, save_agents, share_of, command())
-        blocks[client.submit(_block, asked, source, pure=False)] = seeds
-    for done in as_completed(list(blocks), loop=client.loop):
-        seeds, made = blocks[done], done.result()
-        if sweep.source and made.sources is not None:
-            folder = out / sweep.source.name
+        if job.source and not missing_sources(job.source, seeds, out):
+            source = client.scatter(jax.tree.map(np.asarray, kept_sources(job.source, seeds, out)))
+        asked = _Asked(job.sweep, job.size, seeds, share_of, command())
+        tasks.append(client.submit(_made, asked, source, pure=False))
+    for done in as_completed(tasks, loop=client.loop):
+        made = done.result()
+        if made.sources is not None:
+            assert job.source
+            folder = out / job.source.sweep.name
             with files.locked(folder, waiting=lambda held: None):
-                store.add_part(folder, seeds, made.sources)
-        if made.agents is not None:
-            files.write_whole(agents_path(out / sweep.name, seeds), made.agents)
-        store.add_part(out / sweep.name, seeds, made.results)
+                store.add_part(folder, made.block.seeds, made.sources)
         done.release()
-        yield seeds
+        yield made.block
 
 
 class _Asked(NamedTuple):
@@ -118,7 +110,6 @@ class _Asked(NamedTuple):
     sweep: Sweep
     size: Size
     seeds: range
-    save_agents: bool
     share_of: int | None
     """Workers that share the cores of its machine; None if it has them for itself."""
     command: str
@@ -128,26 +119,32 @@ class _Asked(NamedTuple):
 class _Made(NamedTuple):
     """What a worker returns."""
 
-    results: xr.Dataset
+    block: Block
     sources: xr.Dataset | None
     """Results of the source agents, if it had to train them."""
-    agents: bytes | None
-    """The file of the agents, if it was asked for."""
 
 
-def _block(asked: _Asked, source: Source | None) -> _Made:
-    """On a worker: the results of a block of seeds."""
+def _made(asked: _Asked, source: Source | None) -> _Made:
+    """On a worker: a block of seeds."""
     _prepare(asked.share_of)
-    sweep, size, seeds, trained = asked.sweep, asked.size, asked.seeds, None
-    with working_for(asked.command), tempfile.TemporaryDirectory() as scratch:
-        if sweep.source and source is None:
-            source, trained = sources.trained(sweep.source, size, seeds, quiet)
-        points = points_of(sweep, size.preset)
-        reference = reference_of(points, size.episodes)
-        keep = functools.partial(write_agents, Path(scratch), sweep, size, points, seeds) if asked.save_agents else None
-        results = results_of(sweep, size, points, reference, seeds, source, quiet, keep)
-        saved = agents_path(Path(scratch), seeds).read_bytes() if keep else None
-    return _Made(results, trained, saved)
+    job, sources = _job(asked.sweep, asked.size), None
+    with working_for(asked.command):
+        if job.source and source is None:
+            sources = compute(job.source, asked.seeds).results
+            source = source_in(job.source, sources)
+        block = compute(job, asked.seeds, source)
+    return _Made(block._replace(agents=jax.tree.map(_plain, block.agents)), sources)
+
+
+@functools.lru_cache(maxsize=2)
+def _job(sweep: Sweep, size: Size) -> Job:
+    """A worker makes a job once for all of its blocks."""
+    return Job(sweep, size)
+
+
+def _plain(leaf: Any) -> np.ndarray:
+    """An array that can be sent: keys as the words that they are made of."""
+    return np.asarray(jax.random.key_data(leaf) if jnp.issubdtype(leaf.dtype, jax.dtypes.prng_key) else leaf)
 
 
 def share(cores: list[int], number: int, of: int) -> list[int]:

@@ -4,31 +4,33 @@ from __future__ import annotations
 
 from jrcjax.machine import usable_cores
 from jrcjax.training import parallel
-from sweeps.preset import slots_of
-from sweeps.sweep import Size, Sweep
+from sweeps.engine.job import Group, Job
 
 # Core time of one agent in one slot, microseconds, on the machine of the README's table of speeds.
 _CORE_US = {"tlwd": 6.5, "dpr": 2.8, "ddqn": 2.8, "q_learning": 0.4, "round_robin": 0.2}
 
 
-def _seconds_per_slot(sweep: Sweep, seeds: int, learners: tuple[str, ...]) -> float:
-    agents = parallel.padded(len(sweep.x_values) * seeds)  # whole blocks
+def _seconds_per_slot(group: Group, seeds: int, learners: tuple[str, ...]) -> float:
+    agents = parallel.padded(len(group.rows) * seeds)  # whole blocks
     return agents * sum(_CORE_US[name] for name in learners) * 1e-6 / usable_cores()
 
 
-def seconds_per_episode(sweep: Sweep, size: Size, seeds: int) -> float:
-    """Seconds for one episode of so many seeds at all points."""
-    return slots_of(size.preset) * _seconds_per_slot(sweep, seeds, sweep.learners)
+def seconds_per_episode(job: Job, group: Group, seeds: int) -> float:
+    """Seconds for one episode of so many seeds at all points of a group."""
+    return job.spec.episode_slots * _seconds_per_slot(group, seeds, job.sweep.learners)
 
 
-def pretraining_seconds(sweep: Sweep, size: Size, seeds: int) -> float:
+def pretraining_seconds(job: Job, group: Group, seeds: int) -> float:
     """Seconds for TLwD's updates before its first episode."""
-    return size.pretraining * _seconds_per_slot(sweep, seeds, ("tlwd",)) if "tlwd" in sweep.learners else 0.0
+    return group.config.pretraining * _seconds_per_slot(group, seeds, tuple({"tlwd"} & set(job.sweep.learners)))
 
 
-def block_seconds(sweep: Sweep, size: Size, seeds: int) -> float:
+def block_seconds(job: Job, seeds: int) -> float:
     """Seconds for so many seeds at all points, from start to end."""
-    return pretraining_seconds(sweep, size, seeds) + size.episodes * seconds_per_episode(sweep, size, seeds)
+    return sum(
+        pretraining_seconds(job, group, seeds) + job.size.episodes * seconds_per_episode(job, group, seeds)
+        for group in job.groups
+    )
 
 
 def in_words(seconds: float) -> str:

@@ -1,4 +1,4 @@
-"""A sweep as one XLA program: points x seeds x learners advance together by a chunk of episodes."""
+"""A job's programs: points x seeds x learners advance together by a chunk of episodes, as one XLA program per group."""
 
 from __future__ import annotations
 
@@ -11,30 +11,45 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jrcjax import exact
 from jrcjax.config.paths import Points
 from jrcjax.learners import Source, Spec, make_learner
-from jrcjax.learners.hparams import Config, check_hparams
-from jrcjax.learners.schedules import epsilon
-from jrcjax.model.params import check_params
+from jrcjax.learners.hparams import Config
 from jrcjax.training import parallel
-from jrcjax.training.rollout import AgentState, Log, init_agent, run_episodes, spec_of
+from jrcjax.training.rollout import AgentState, Log, init_agent, run_episodes
 from jrcjax.training.transfer import target_key
 from jrcjax.types import Key
-from sweeps.sweep import Size, Sweep
+from sweeps.engine.job import Group, Job
 
 _CHUNK = 20  # most episodes between two reports of progress: a few seconds
 
 
-class Progress(NamedTuple):
-    """A chunk of a running sweep."""
+class Lanes(NamedTuple):
+    """The lanes of a group of points; a lane is one seed at one point."""
 
+    keys: Key
+    """[lanes] of the seeds."""
+    points: np.ndarray
+    """[lanes] number of the point among those of the job."""
+    seeds: np.ndarray
+    """[lanes] number of the seed in its block."""
+    shape: tuple[int, int]
+    """Points and seeds."""
+
+    def unpadded(self, tree: Any) -> Any:
+        """Leaves [padded lanes, ...] as [points, seeds, ...]."""
+        return jax.tree.map(lambda leaf: leaf[: math.prod(self.shape)].reshape(*self.shape, *leaf.shape[1:]), tree)
+
+
+class Chunk(NamedTuple):
+    """Some episodes of a group of points."""
+
+    group: Group
+    lanes: Lanes
     episodes: int
-    """Episodes in the chunk."""
     log: dict[str, Log]
-    """By learner: [points, seeds, episodes] each."""
-    groups: list[dict[str, AgentState]]
-    """Agents by learner after the chunk, gone with the next, in groups of lanes; see `joined`."""
+    """By learner: [points of the group, seeds, episodes] each."""
+    agents: list[dict[str, AgentState]]
+    """Agents by learner after the chunk, gone with the next, in batches of padded lanes; see `joined`."""
 
 
 def chunk_of(episodes: int) -> int:
@@ -42,51 +57,8 @@ def chunk_of(episodes: int) -> int:
     return max(d for d in range(1, min(episodes, _CHUNK) + 1) if episodes % d == 0)
 
 
-def points_of(sweep: Sweep, preset: str) -> Points:
-    """The environments and hyperparameters of all points, checked and stacked along a leading axis."""
-    points = [Points(sweep.params_at(x, preset), sweep.hparams_at(x)) for x in sweep.x_values]
-    for point in points:
-        check_params(point.params)
-        check_hparams(point.hparams)
-    return jax.tree.map(lambda *leaves: jnp.stack(leaves), *points)
-
-
-def spec_of_points(points: Points) -> Spec:
-    """What learners need to know of all points alike."""
-    return spec_of(jax.tree.map(lambda leaf: leaf[0], points.params))
-
-
-class Reference(NamedTuple):
-    """Exact long-run figures at each point."""
-
-    optimum: exact.LongRun
-    """[points]."""
-    constant: exact.LongRun
-    """Of the best policy that ignores the state, [points]."""
-    explored: exact.LongRun
-    """Of the optimal policy with the learners' random actions, [points, episodes]: the most that a learner can earn."""
-
-
-def reference_of(points: Points, episodes: int) -> Reference:
-    """What learners are held against at each point."""
-    slots = points.params.max_steps_in_episode
-
-    def at(point: Points) -> Reference:
-        params, hparams = point
-        best = exact.optimal_policy(params)
-
-        def explored(episode):
-            random = epsilon(episode * slots + jnp.arange(slots), hparams).mean()
-            return exact.evaluate_policy(params, (1 - random) * best + random / params.num_actions)
-
-        optimum, constant = (exact.evaluate_policy(params, p) for p in (best, exact.best_constant_action(params)))
-        return Reference(optimum, constant, jax.vmap(explored)(jnp.arange(episodes)))
-
-    return jax.jit(jax.vmap(at))(points)
-
-
 class Program(NamedTuple):
-    """A sweep's compiled functions over lanes; a lane is one seed at one point."""
+    """Compiled functions over lanes."""
 
     start: Callable
     """(points, (keys, sources, points' numbers)) to the agents of all learners before their first episode."""
@@ -127,47 +99,53 @@ def keys_of(seeds: np.ndarray) -> Key:
     return jax.vmap(lambda i: jax.random.fold_in(jax.random.key(0), i))(jnp.asarray(seeds))
 
 
-def run_block(sweep: Sweep, size: Size, points: Points, seeds: range, source: Source | None) -> Iterator[Progress]:
-    """Runs some seeds of a sweep at all of its points, one chunk of episodes after the other.
+def lanes_of(job: Job, group: Group, seeds: range) -> Lanes:
+    """The lanes of a block of seeds in a group.
 
     A seed has the same key at every point and for every learner, in whatever block it runs: that of `keys_of`, or its
-    `target_key` in a sweep that transfers, since the seed's source agent has the other. Lanes advance in groups that
-    give each device one block, so the compiled code, and with it every bit of a seed's results, is the same whatever
-    seeds run beside it.
+    `target_key` in a sweep that transfers, since the seed's source agent has the other.
+    """
+    shape = (len(group.rows), len(seeds))
+    point, seed = (a.reshape(-1) for a in np.indices(shape))
+    keys = keys_of(np.array(seeds)[seed])
+    return Lanes(jax.vmap(target_key)(keys) if job.source else keys, np.array(group.rows)[point], seed, shape)
+
+
+def advance(job: Job, seeds: range, source: Source | None) -> Iterator[Chunk]:
+    """Runs some seeds of a job at all of its points: group by group, one chunk of episodes after the other.
+
+    Lanes advance in batches that give each device one block, so the compiled code, and with it every bit of a seed's
+    results, is the same whatever seeds run beside it.
 
     Args:
-      sweep: what to run.
-      size: how much of it.
-      points: its points.
+      job: what to run.
       seeds: the seeds.
       source: of the seeds, if the sweep transfers; every leaf has leading axes of the source's points and of seeds.
     """
-    chunk = chunk_of(size.episodes)
-    spec = spec_of_points(points)
-    program = program_of(sweep.learners, spec, sweep.config(size), chunk)
-    shape = (len(sweep.x_values), len(seeds))
-    point, seed = (a.reshape(-1) for a in np.indices(shape))
-    keys = keys_of(np.array(seeds)[seed])
-    if sweep.source:
-        keys = jax.vmap(target_key)(keys)
-    source_point = np.array(sweep.source_points or [0] * shape[0])[point]
-    of_lane: Any = jax.tree.map(lambda leaf: leaf[source_point, seed], source)
-    groups = [
-        (program.start(points, lanes), lanes[2]) for lanes in parallel.groups((keys, of_lane, jnp.asarray(point)))
-    ]
-    for first in range(0, size.episodes, chunk):
-        advanced = [program.advance((points, jnp.int32(first)), group) for group in groups]
-        groups = [lanes for lanes, _ in advanced]
-        log = joined([log for _, log in advanced])
-        unpadded = jax.tree.map(lambda a: a[: math.prod(shape)].reshape(*shape, chunk), log)
-        yield Progress(chunk, unpadded, [agents for agents, _ in groups])
+    for group in job.groups:
+        yield from _advance_group(job, group, lanes_of(job, group, seeds), source)
 
 
-def joined(groups: list[Any]) -> Any:
-    """Groups of lanes as one, on the host.
+def _advance_group(job: Job, group: Group, lanes: Lanes, source: Source | None) -> Iterator[Chunk]:
+    episodes = group.config.episodes
+    chunk, points = chunk_of(episodes), job.points  # all of them, so that groups of any number have the same shapes
+    program = program_of(job.sweep.learners, job.spec, group.config, chunk)
+    of_lane: Any = jax.tree.map(lambda leaf: leaf[job.source_points[lanes.points], lanes.seeds], source)
+    started = parallel.groups((lanes.keys, of_lane, jnp.asarray(lanes.points)))
+    batches = [(program.start(points, batch), batch[2]) for batch in started]
+    del started
+    for first in range(0, episodes, chunk):
+        advanced = [program.advance((points, jnp.int32(first)), batch) for batch in batches]
+        batches = [batch for batch, _ in advanced]
+        log = lanes.unpadded(joined([log for _, log in advanced]))
+        yield Chunk(group, lanes, chunk, log, [agents for agents, _ in batches])
 
-    Joined on the devices they would be exchanged between them, and a device that waits for another which has the work
-    of other groups before it waits until XLA gives up.
+
+def joined(batches: list[Any]) -> Any:
+    """Batches of lanes as one, on the host.
+
+    Joined on the devices they would be exchanged between them. A device waits for the other one, which may have other
+    batches to advance first, and XLA gives up after a while.
     """
 
     def join(*parts: Any) -> Any:
@@ -175,4 +153,4 @@ def joined(groups: list[Any]) -> Any:
             return jax.random.wrap_key_data(join(*map(jax.random.key_data, parts)))
         return np.concatenate([np.asarray(part) for part in parts])
 
-    return jax.tree.map(join, *groups)
+    return jax.tree.map(join, *batches)

@@ -2,30 +2,24 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
-import jax
-import numpy as np
-import xarray as xr
 from rich.console import Console
 
 from jrcjax import files
 from jrcjax.learners import Source
 from jrcjax.machine import usable_cores
-from jrcjax.training.rollout import AgentState, Log
 from sweeps import progress
 from sweeps.engine import estimate
-from sweeps.engine.program import Points, Reference, points_of, reference_of, run_block
+from sweeps.engine.block import Block, block_of
+from sweeps.engine.job import Job
+from sweeps.engine.program import Chunk, advance
 from sweeps.engine.sources import missing_sources, sources_of
 from sweeps.results import store
 from sweeps.results.agents import check_agents, write_agents
 from sweeps.sweep import Size, Sweep
-
-Keep: TypeAlias = Callable[[list[dict[str, AgentState]]], Any]
-"""What is done with a block's agents before its part is written."""
 
 
 def blocks(wanted: int, finished: set[int], per_part: int) -> Iterator[range]:
@@ -42,24 +36,26 @@ def blocks(wanted: int, finished: set[int], per_part: int) -> Iterator[range]:
         seed = stop
 
 
-def to_do(sweep: Sweep, size: Size, out: Path) -> list[range]:
-    """The blocks of a sweep that are still to be run.
+def to_do(job: Job, out: Path) -> list[range]:
+    """The blocks of a job that are still to be run.
 
     Raises:
       ConfigurationMismatch: if there are results of another configuration.
     """
-    folder = out / sweep.name
-    store.check_folder(folder, sweep, size)
-    return list(blocks(size.seeds, store.finished_seeds(folder), sweep.seeds_per_part))
+    folder = out / job.sweep.name
+    store.check_folder(folder, job)
+    return list(blocks(job.size.seeds, store.finished_seeds(folder), job.sweep.seeds_per_part))
 
 
 def expected_seconds(sweeps: list[Sweep], size: Size, out: Path) -> float:
     """What these sweeps will take, with the source agents that they lack, as far as one can tell beforehand."""
-    todo = {sweep: to_do(sweep, size, out) for sweep in sweeps}
-    transfers = {(sweep.source, seeds) for sweep in sweeps if sweep.source for seeds in todo[sweep]}
-    lacking = {(source, missing_sources(source, size, seeds, out)) for source, seeds in transfers}
-    agents = sum(estimate.block_seconds(source, size, len(seeds)) for source, seeds in lacking if seeds)
-    return agents + sum(estimate.block_seconds(sweep, size, len(seeds)) for sweep in sweeps for seeds in todo[sweep])
+    seconds, lacking = 0.0, {}
+    for job in [Job(sweep, size) for sweep in sweeps]:
+        for seeds in to_do(job, out):
+            seconds += estimate.block_seconds(job, len(seeds))
+            if job.source and (missing := missing_sources(job.source, seeds, out)):
+                lacking[job.source.sweep, missing] = estimate.block_seconds(job.source, len(missing))
+    return seconds + sum(lacking.values())
 
 
 def run_sweep(
@@ -87,29 +83,31 @@ def run_sweep(
       The folder with the results.
 
     Raises:
-      ValueError: bad sizes, or a folder that already holds results, or holds some without their agents.
+      ValueError: bad sizes, more than this machine can hold, or a folder that already holds results, or holds some
+        without their agents.
       FolderInUse: if another process writes to the folder.
     """
     size.check()
-    folder = out / sweep.name
-    todo = to_do(sweep, size, out)
+    job, folder = Job(sweep, size), out / sweep.name
+    job.check()
+    todo = to_do(job, out)
     finished = size.seeds - sum(map(len, todo))
     if finished and not resume:
         raise ValueError(f"{folder} holds results of {finished} seeds already; add --resume, or choose another --out")
     if save_agents:
-        check_agents(folder, sweep)
+        check_agents(folder, job)
     if not todo:
         console.print(f"{sweep.name}: all {size.seeds} seeds are there, in {folder}")
         store.write_manifest(folder)
         return folder
     seconds = expected_seconds([sweep], size, out)
-    console.print(_announcement(sweep, size, todo, seconds))
+    console.print(_announcement(job, todo, seconds))
     with files.locked(folder):
         try:
             if client is None:
-                _run_blocks(sweep, size, out, console, seconds, save_agents)
+                _run_here(job, out, console, seconds, save_agents)
             else:
-                _run_on_cluster(client, sweep, size, out, console, save_agents)
+                _run_on_cluster(client, job, out, console, save_agents)
         except (KeyboardInterrupt, OSError):
             saved = store.in_words(store.finished_seeds(folder))
             held = f"seeds {saved}" if saved else "nothing yet"
@@ -118,77 +116,59 @@ def run_sweep(
     return folder
 
 
-def _run_blocks(sweep: Sweep, size: Size, out: Path, console: Console, seconds: float, save_agents: bool) -> None:
+def save(block: Block, job: Job, out: Path, save_agents: bool) -> None:
+    """Keeps a block: its agents if they are wanted, then its part."""
+    folder = out / job.sweep.name
+    if save_agents:
+        write_agents(folder, job, block.seeds, block.agents)
+    store.add_part(folder, block.seeds, block.results)
+
+
+class _Shown:
+    """Computes blocks while a bar shows how many of the expected seconds are done."""
+
+    def __init__(self, told: Callable[[float], None]):
+        self._told = told
+
+    def compute(self, job: Job, seeds: range, source: Source | None) -> Block:
+        return block_of(job, seeds, self._chunks(job, seeds, source))
+
+    def _chunks(self, job: Job, seeds: range, source: Source | None) -> Iterator[Chunk]:
+        started = set()
+        for chunk in advance(job, seeds, source):
+            seconds = chunk.episodes * estimate.seconds_per_episode(job, chunk.group, len(seeds))
+            if chunk.group not in started:
+                seconds += estimate.pretraining_seconds(job, chunk.group, len(seeds))
+            started.add(chunk.group)
+            self._told(seconds)
+            yield chunk
+
+
+def _run_here(job: Job, out: Path, console: Console, seconds: float, save_agents: bool) -> None:
     """Runs what is missing, as it is now that nobody else writes, and shows the progress of so many seconds."""
-    points = points_of(sweep, size.preset)
-    reference = reference_of(points, size.episodes)
-    with progress.shown(console, sweep.name, seconds) as told:
-        for seeds in to_do(sweep, size, out):
-            keep = functools.partial(write_agents, out / sweep.name, sweep, size, points, seeds)
-            _run_block(sweep, size, points, reference, seeds, out, told, keep if save_agents else None)
+    with progress.shown(console, job.sweep.name, seconds) as told:
+        shown = _Shown(told)
+        for seeds in to_do(job, out):
+            source = sources_of(job.source, seeds, out, shown.compute) if job.source else None
+            save(shown.compute(job, seeds, source), job, out, save_agents)
 
 
-def _run_on_cluster(client: Any, sweep: Sweep, size: Size, out: Path, console: Console, save_agents: bool) -> None:
+def _run_on_cluster(client: Any, job: Job, out: Path, console: Console, save_agents: bool) -> None:
     """The same on a cluster; the progress counts seeds, over all workers."""
-    from sweeps.engine import distributed  # which builds upon this module
+    from sweeps.engine import distributed  # which needs an extra
 
-    todo = to_do(sweep, size, out)
-    with progress.shown(console, f"{sweep.name} on a cluster", sum(map(len, todo))) as told:
-        for seeds in distributed.run_blocks(client, sweep, size, out, todo, save_agents):
-            told(len(seeds))
+    todo = to_do(job, out)
+    with progress.shown(console, f"{job.sweep.name} on a cluster", sum(map(len, todo))) as told:
+        for block in distributed.compute_blocks(client, job, out, todo):
+            save(block, job, out, save_agents)
+            told(len(block.seeds))
 
 
-def _announcement(sweep: Sweep, size: Size, todo: list[range], seconds: float) -> str:
-    agents = len(sweep.x_values) * sum(map(len, todo)) * len(sweep.learners)
+def _announcement(job: Job, todo: list[range], seconds: float) -> str:
+    points, seeds = len(job.sweep.design), sum(map(len, todo))
+    agents = points * seeds * len(job.sweep.learners)
+    programs = f" in {len(job.groups)} programs" if len(job.groups) > 1 else ""
     return (
-        f"{sweep.name}: {agents} agents (points x seeds x learners), {size.episodes} episodes each; expected "
-        f"{estimate.in_words(seconds)} with {usable_cores()} cores, and half a minute of compiling"
+        f"{job.sweep.name}: {agents} agents (points x seeds x learners){programs}, {job.size.episodes} episodes each; "
+        f"expected {estimate.in_words(seconds)} with {usable_cores()} cores, and half a minute of compiling"
     )
-
-
-def _run_block(
-    sweep: Sweep,
-    size: Size,
-    points: Points,
-    reference: Reference,
-    seeds: range,
-    out: Path,
-    advance: Callable[[float], None],
-    keep: Keep | None = None,
-) -> None:
-    """Runs one block of seeds and writes its part; `advance` is told how many of the expected seconds are done."""
-    source = sources_of(sweep.source, size, seeds, out, advance) if sweep.source else None
-    folder = out / sweep.name
-    store.add_part(folder, seeds, results_of(sweep, size, points, reference, seeds, source, advance, keep))
-
-
-def quiet(seconds: float) -> None:
-    """An `advance` that shows no progress."""
-
-
-def results_of(
-    sweep: Sweep,
-    size: Size,
-    points: Points,
-    reference: Reference,
-    seeds: range,
-    source: Source | None,
-    advance: Callable[[float], None],
-    keep: Keep | None = None,
-) -> xr.Dataset:
-    """The results of one block of seeds.
-
-    `advance` is told how many of the expected seconds are done, `keep` is given the agents after their last episode.
-    """
-    groups: list[dict[str, AgentState]] = []
-    logs: list[dict[str, Log]] = []
-    for chunk in run_block(sweep, size, points, seeds, source):
-        if not logs:
-            advance(estimate.pretraining_seconds(sweep, size, len(seeds)))
-        logs.append(chunk.log)
-        groups = chunk.groups
-        advance(chunk.episodes * estimate.seconds_per_episode(sweep, size, len(seeds)))
-    if keep:
-        keep(groups)
-    whole = jax.tree.map(lambda *parts: np.concatenate(parts, axis=-1), *logs)
-    return store.dataset(sweep, size, seeds, whole, reference)

@@ -12,12 +12,10 @@ import xarray as xr
 
 from jrcjax import provenance
 from jrcjax.checks import refuse
-from sweeps.engine.program import points_of, reference_of
-from sweeps.engine.run import quiet, results_of
-from sweeps.engine.sources import trained
+from sweeps.engine.block import compute, source_in
+from sweeps.engine.job import Job
 from sweeps.results import store
 from sweeps.results.parts import Part, parts_of, read_part
-from sweeps.studies.custom import Options, custom_sweep
 from sweeps.sweep import Size, Sweep
 
 
@@ -60,25 +58,20 @@ def size_of_part(part: Part) -> Size:
     return Size(seeds=part.seeds.stop, episodes=config["episodes"], preset=config["preset"], **held)
 
 
-def recomputed(part: Part, sweep: Sweep, hands_on: bool) -> xr.Dataset:
+def recomputed(part: Part, sweep: Sweep) -> xr.Dataset:
     """The results of a part, computed anew; the source agents of a sweep that transfers are trained anew, too.
 
     Args:
       part: what is on disk.
       sweep: its sweep.
-      hands_on: whether the part holds source agents.
 
     Raises:
       ConfigurationMismatch: if today's sweep of that name is not the one that made the part.
     """
-    size = size_of_part(part)
-    store.check_configuration(part, store.configuration(sweep, size))
-    if hands_on:
-        return trained(sweep, size, part.seeds, quiet)[1]
-    source = trained(sweep.source, size, part.seeds, quiet)[0] if sweep.source else None
-    points = points_of(sweep, size.preset)
-    reference = reference_of(points, size.episodes)
-    return results_of(sweep, size, points, reference, part.seeds, source, quiet)
+    job = Job(sweep, size_of_part(part))
+    store.check_configuration(part, store.configuration(job))
+    source = source_in(job.source, compute(job.source, part.seeds).results) if job.source else None
+    return compute(job, part.seeds, source).results
 
 
 def differences(there: xr.Dataset, again: xr.Dataset) -> list[Difference]:
@@ -124,20 +117,18 @@ def verify(folder: Path, number: int | None, sweeps: Mapping[str, Sweep]) -> lis
     results = []
     for part in sample_of(parts, number):
         sweep = _sweep_of(part, sweeps)
-        hands_on = any(other.source and other.source.name == sweep.name for other in sweeps.values())
-        results.append((part, differences(read_part(part.path), recomputed(part, sweep, hands_on))))
+        results.append((part, differences(read_part(part.path), recomputed(part, sweep))))
     return results
 
 
 def _sweep_of(part: Part, sweeps: Mapping[str, Sweep]) -> Sweep:
-    """Today's sweep of the name that a part gives, or what the part's recipe makes."""
-    if recipe := part.configuration.get("recipe"):
-        several = {name: tuple(recipe[name]) for name in ("set", "learners")}
-        return custom_sweep(Options(**(recipe | several)), part.configuration["preset"], tuple(sweeps)).sweep
+    """Today's sweep of the name that a part gives; one of a person's own is what the part says of it."""
     name = part.configuration["sweep"]
-    if name not in sweeps:
+    if name in sweeps:
+        return sweeps[name]
+    if not part.configuration.get("own"):
         refuse(str(part.path), f"results of the sweep {name!r}", ", ".join(map(repr, sweeps)))
-    return sweeps[name]
+    return store.sweep_of(part.configuration)
 
 
 def made_elsewhere(part: Part) -> list[str]:

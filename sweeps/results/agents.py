@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import jax
-
 from jrcjax import save_agents
-from jrcjax.agents.file import LEARNING, acting_part
+from jrcjax.agents.file import LEARNING
 from jrcjax.training.rollout import AgentState
-from sweeps.engine.program import Points, joined
+from sweeps.engine.job import Job
 from sweeps.results import store
-from sweeps.sweep import Size, Sweep
 
 
 def agents_path(folder: Path, seeds: range) -> Path:
@@ -19,40 +16,29 @@ def agents_path(folder: Path, seeds: range) -> Path:
     return folder / f"agents-{seeds.start:06d}-{seeds.stop - 1:06d}.safetensors"
 
 
-def write_agents(
-    folder: Path, sweep: Sweep, size: Size, points: Points, seeds: range, groups: list[dict[str, AgentState]]
-) -> Path:
-    """Writes what the agents of a block act by; Round Robin has nothing of the kind.
+def write_agents(folder: Path, job: Job, seeds: range, agents: dict[str, AgentState]) -> Path:
+    """Writes what the agents of a block act by.
 
     Args:
       folder: of the sweep's results.
-      sweep: what was run.
-      size: how much of it.
-      points: its points.
+      job: what was run.
       seeds: the seeds of the block.
-      groups: of lanes, by learner, as in `sweeps.engine.program.Progress`.
+      agents: by learner, of their state what they act by, every leaf with leading axes of points and of seeds.
     """
-    shape = (len(sweep.x_values), len(seeds))
-    lanes = shape[0] * shape[1]
-
-    def kept(name: str) -> AgentState:
-        agents = [group[name]._replace(learner=acting_part(group[name].learner)) for group in groups]
-        return jax.tree.map(lambda leaf: leaf[:lanes].reshape(*shape, *leaf.shape[1:]), joined(agents))
-
-    learning = {name: kept(name) for name in sweep.learners if name in LEARNING}
-    return save_agents(agents_path(folder, seeds), learning, *points, config=sweep.config(size), seeds=seeds)
+    return save_agents(agents_path(folder, seeds), agents, *job.points, config=job.groups[0].config, seeds=seeds)
 
 
-def check_agents(folder: Path, sweep: Sweep) -> None:
-    """Refuses a sweep without agents to save, and a folder with results whose agents were not saved.
+def check_agents(folder: Path, job: Job) -> None:
+    """Refuses a sweep without agents to save or with several settings, and results whose agents were not saved.
 
     Raises:
       ValueError: naming the seeds.
     """
-    if not set(sweep.learners) & set(LEARNING):
-        raise ValueError(
-            f"save-agents: {', '.join(sweep.learners)} has nothing to save; allowed: {', '.join(LEARNING)}"
-        )
+    learners = ", ".join(job.sweep.learners)
+    if not set(job.sweep.learners) & set(LEARNING):
+        raise ValueError(f"save-agents: {learners} has nothing to save; allowed: {', '.join(LEARNING)}")
+    if len(job.groups) > 1:
+        raise ValueError(f"save-agents: points of {len(job.groups)} settings; allowed: points that share all of config")
     without = [part.seeds for part in store.parts_of(folder) if not agents_path(folder, part.seeds).exists()]
     bare = {seed for seeds in without for seed in seeds}
     if bare:

@@ -6,31 +6,24 @@ folder, for a reader; it follows from the parts and is written anew whenever it 
 
 from __future__ import annotations
 
-import hashlib
 import json
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import jax
 import numpy as np
 import xarray as xr
 
-from jrcjax import files, numerics
-from jrcjax.exact import LongRun
-from jrcjax.learners.hparams import HParams
-from jrcjax.model.params import EnvParams
-from jrcjax.named import named_arrays, named_settings
+from jrcjax import files
 from jrcjax.provenance import provenance
 from jrcjax.training.rollout import Log
 from sweeps import interrupts
-from sweeps.engine.program import Reference, points_of
+from sweeps.engine.job import Job
+from sweeps.results.configuration import configuration, coordinates, differing, sweep_of
 from sweeps.results.parts import Part, finished_seeds, part_path, parts_of, read_part, write_part
-from sweeps.sweep import Size, Sweep
 
 __all__ = [
     "MANIFEST", "ConfigurationMismatch", "add_part", "check_configuration", "check_folder", "configuration", "dataset",
-    "digest_of", "finished_seeds", "load", "part_path", "write_manifest", "write_part",
+    "finished_seeds", "load", "part_path", "sweep_of", "write_manifest", "write_part",
 ]  # fmt: skip
 
 MANIFEST = "manifest.json"
@@ -40,52 +33,16 @@ class ConfigurationMismatch(ValueError):
     """A folder holds results of another configuration."""
 
 
-def digest_of(points: EnvParams) -> str:
-    """Hash of every number and setting of the environments, but for what is derived from the others."""
-    digest = hashlib.sha256(repr(named_settings(points)).encode())
-    for name, leaf in named_arrays(points).items():
-        digest.update(f"{name} {leaf.dtype} {leaf.shape} ".encode() + np.asarray(leaf).tobytes())
-    return digest.hexdigest()[:16]
-
-
-def configuration(sweep: Sweep, size: Size) -> dict[str, Any]:
-    """What must agree for two parts to be of one result. The number of seeds is not part of it."""
-    points = points_of(sweep, size.preset)
-    found = {
-        "sweep": sweep.name,
-        "preset": size.preset,
-        "episodes": size.episodes,
-        "learners": sweep.learners,
-        "x": {sweep.x_name: sweep.x_values},
-        "environments": digest_of(points.params),
-        "hparams": {name: _plain(getattr(points.hparams, name)) for name in vars(HParams())},
-        "numerics": numerics.in_force(),
-        "config": {name: value for name, value in asdict(sweep.config(size)).items() if name != "episodes"},
-    }
-    if sweep.recipe:
-        found["recipe"] = asdict(sweep.recipe)
-    if sweep.source:
-        found["source"] = configuration(sweep.source, size)
-        found["source points"] = sweep.source_points
-    return json.loads(json.dumps(found))
-
-
-def _plain(values: jax.Array) -> float | list[float]:
-    """A number that is the same at all points, or one for each; a float32 as the number that was meant."""
-    numbers = [float(str(value)) for value in np.asarray(values)]
-    return numbers[0] if len(set(numbers)) == 1 else numbers
-
-
-def check_folder(folder: Path, sweep: Sweep, size: Size) -> None:
+def check_folder(folder: Path, job: Job) -> None:
     """Refuses a folder with results of another configuration, and sets aside what is of another sweep.
 
     Raises:
       ConfigurationMismatch: naming each field that differs, with both values.
     """
     parts = parts_of(folder)
-    wanted = configuration(sweep, size) if parts else {}
+    wanted = configuration(job) if parts else {}
     for part in parts:
-        if part.configuration.get("sweep") != sweep.name:
+        if part.configuration.get("sweep") != job.sweep.name:
             files.set_aside(part.path, f"it is of the sweep {part.configuration.get('sweep')!r}")
         else:
             check_configuration(part, wanted)
@@ -97,48 +54,37 @@ def check_configuration(part: Part, wanted: dict[str, Any]) -> None:
     Raises:
       ConfigurationMismatch: naming each field that differs, with both values.
     """
-    if differing := _differing(part.configuration, wanted):
+    if found := differing(part.configuration, wanted):
         raise ConfigurationMismatch(
-            f"{part.path} holds results of another configuration ({'; '.join(differing)}); "
+            f"{part.path} holds results of another configuration ({'; '.join(found)}); "
             "choose another --out, or remove the folder"
         )
 
 
-def _differing(there: dict[str, Any], wanted: dict[str, Any], prefix: str = "") -> list[str]:
-    """What differs between two configurations, by dotted field."""
-    found = []
-    for key in sorted({*there, *wanted}):
-        a, b = there.get(key), wanted.get(key)
-        if isinstance(a, dict) and isinstance(b, dict):
-            found += _differing(a, b, f"{prefix}{key}.")
-        elif a != b:
-            found.append(f"{prefix}{key}: {json.dumps(a)} there, {json.dumps(b)} wanted")
-    return found
-
-
-def dataset(sweep: Sweep, size: Size, seeds: range, log: dict[str, Log], exact: Reference) -> xr.Dataset:
+def dataset(job: Job, seeds: range, log: dict[str, Log]) -> xr.Dataset:
     """Results of some seeds with named dimensions: algorithm, point, seed, episode (from 1).
 
-    `first_diverged` is the first episode after which an agent's values had diverged, -1 if there is none.
+    What varies between points is a coordinate along `point`, by the name of its column. `first_diverged` is the first
+    episode after which an agent's values had diverged, -1 if there is none.
     """
     dims = ("algorithm", "point", "seed", "episode")
-    stacked = {name: np.stack([getattr(log[learner], name) for learner in sweep.learners]) for name in Log._fields}
+    learners = job.sweep.learners
+    stacked = {name: np.stack([getattr(log[learner], name) for learner in learners]) for name in Log._fields}
     diverged = stacked.pop("diverged")
     first = np.where(diverged.any(axis=-1), diverged.argmax(axis=-1) + 1, -1)
     variables: dict[str, Any] = {name: (dims, values) for name, values in stacked.items()}
     variables["first_diverged"] = (dims[:-1], first)
-    for policy in Reference._fields:
-        run: LongRun = getattr(exact, policy)
+    for policy, run in job.reference._asdict().items():
         values = {name: np.asarray(value) for name, value in run._asdict().items()}
         variables |= {f"{policy}_{name}": (("point", "episode")[: v.ndim], v) for name, v in values.items()}
     coords = {
-        "algorithm": list(sweep.learners),
-        "point": np.arange(len(sweep.x_values)),
-        sweep.x_name: ("point", np.asarray(sweep.x_values, float)),
+        "algorithm": list(learners),
+        "point": np.arange(len(job.sweep.design)),
+        **{name: ("point", values) for name, values in coordinates(job).items()},
         "seed": np.array(seeds),
-        "episode": np.arange(1, size.episodes + 1),
+        "episode": np.arange(1, job.size.episodes + 1),
     }
-    about = {"configuration": configuration(sweep, size), "provenance": provenance()}
+    about = {"configuration": configuration(job), "provenance": provenance()}
     return xr.Dataset(variables, coords, {name: json.dumps(value, sort_keys=True) for name, value in about.items()})
 
 
@@ -204,8 +150,8 @@ def joined(parts: list[Part]) -> xr.Dataset:
       ConfigurationMismatch: if the parts are not of one configuration.
     """
     for part in parts:
-        if differing := _differing(part.configuration, parts[0].configuration):
-            raise ConfigurationMismatch(f"{part.path} does not go with {parts[0].path}: {'; '.join(differing)}")
+        if found := differing(part.configuration, parts[0].configuration):
+            raise ConfigurationMismatch(f"{part.path} does not go with {parts[0].path}: {'; '.join(found)}")
     whole = xr.concat(
         [read_part(part.path) for part in parts],
         "seed",

@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
-
-import jax.numpy as jnp
-
-from jrcjax.learners.hparams import HParams
-from sweeps.engine.sources import SOURCE
-from sweeps.preset import environment_of
+from sweeps.design import table
+from sweeps.studies.source import SOURCE
 from sweeps.sweep import Sweep
 
 VARIANTS: dict[str, dict[str, float]] = {
@@ -20,24 +15,15 @@ VARIANTS: dict[str, dict[str, float]] = {
     "source agent's initial weights": {"initial_weights": 1},
 }
 """What is changed at each point, in order."""
-
-
-def hparams_at(number: float) -> HParams:
-    """The hyperparameters of variant `number`."""
-    changes = list(VARIANTS.values())[int(number)]
-    default = HParams()
-    return dataclasses.replace(
-        default, **{name: jnp.asarray(value, getattr(default, name).dtype) for name, value in changes.items()}
-    )
-
+_CHANGED = ("margin_weight", "margin", "n_step_weight", "initial_weights")
 
 ABLATION = Sweep(
     name="ablation",
     description="TLwD in the target with parts of its loss left out",
     learners=("tlwd",),
-    x_name="variant",
-    x_values=tuple(float(number) for number in range(len(VARIANTS))),
-    params_at=lambda x, preset: environment_of("target", preset),
-    hparams_at=hparams_at,
+    design=table(
+        [{"variant": float(number)} | changes for number, changes in enumerate(VARIANTS.values())],
+        {"variant": ""} | {name: f"hparams.{name}" for name in _CHANGED},
+    ),
     source=SOURCE,
 )

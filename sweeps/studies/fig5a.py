@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from sweeps.preset import environment_of
 from sweeps.sweep import Sweep
 
 FIG5A = Sweep(
     name="fig5a",
     description="learning curves in the source environment: DDQN, Q-learning, Round Robin",
     learners=("ddqn", "q_learning", "round_robin"),
-    x_name="environment",
-    x_values=(0.0,),
-    params_at=lambda x, preset: environment_of("source", preset),
+    environment="source",
 )

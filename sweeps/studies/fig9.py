@@ -2,29 +2,26 @@
 
 from __future__ import annotations
 
-import jax.numpy as jnp
-
-from jrcjax.learners.hparams import HParams
-from sweeps.engine.sources import SOURCE
-from sweeps.preset import environment_of
+from sweeps.design import table
+from sweeps.studies.source import SOURCE
 from sweeps.sweep import Sweep
 
-
-def hparams_at(prioritised: float) -> HParams:
-    """(alpha, beta) = (0.4, 0.6 to 1) for 1, and (0, 0), which samples uniformly, for 0."""
-    if prioritised:
-        return HParams()
-    zero = jnp.float32(0.0)
-    return HParams(priority_exponent=zero, importance_start=zero, importance_end=zero)
-
+PATHS = {
+    "prioritised": "",
+    "priority_exponent": "hparams.priority_exponent",
+    "importance_start": "hparams.importance_start",
+    "importance_end": "hparams.importance_end",
+}
+"""What varies, by column."""
+PRIORITISED = {"prioritised": 1.0}
+"""(alpha, beta) = (0.4, 0.6 to 1), as in the base."""
+UNIFORM = {"prioritised": 0.0, "priority_exponent": 0.0, "importance_start": 0.0, "importance_end": 0.0}
+"""(alpha, beta) = (0, 0)."""
 
 FIG9 = Sweep(
     name="fig9",
     description="learning curves of TLwD in the target environment, prioritised replay against uniform",
     learners=("tlwd",),
-    x_name="prioritised",
-    x_values=(1.0, 0.0),
-    params_at=lambda x, preset: environment_of("target", preset),
-    hparams_at=hparams_at,
+    design=table((PRIORITISED, UNIFORM), PATHS),
     source=SOURCE,
 )

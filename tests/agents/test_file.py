@@ -1,7 +1,8 @@
 """Trained agents on disk: bit-exact, acting, evaluated, handed on; and files that are none."""
 
 import functools
-import json
+import os
+from pathlib import Path
 
 import jax
 import jax.numpy as jnp
@@ -13,9 +14,11 @@ from safetensors.numpy import load_file, save_file
 
 import jrcjax
 from jrcjax import exact
-from jrcjax.agents import file as agent_file
+from jrcjax.agents import layout
+from jrcjax.config.toml import to_toml
 from jrcjax.model.params import Factor
-from sweeps.engine.program import points_of
+from sweeps.design import along
+from sweeps.engine.job import Job
 from sweeps.engine.run import run_sweep
 from sweeps.results import store
 from sweeps.results.agents import agents_path
@@ -256,26 +259,95 @@ def test_files_that_are_none_are_refused(file, tmp_path):
         broken.write_bytes(content)
         with pytest.raises(ValueError, match="broken: damaged, or not a file that save_agent wrote"):
             jrcjax.load_agent(broken)
+    for make, reason in ((Path.mkdir, "it is a folder"), (os.mkfifo, "it is a named pipe")):
+        make(tmp_path / "other")
+        with pytest.raises(ValueError, match=f"other: {reason}"):
+            jrcjax.load_agent(tmp_path / "other")
+        (tmp_path / "other").rename(tmp_path / reason.replace(" ", "-"))
     save_file({"a": np.zeros(3)}, broken)
     with pytest.raises(ValueError, match="broken: a safetensors file without agents"):
         jrcjax.load_agent(broken)
 
 
-def rewritten(file, target, change):
-    """A copy with other metadata."""
-    with agent_file.opened(file) as (_, about):
-        about = {**about, **change}
-    save_file(load_file(file), target, {agent_file.ABOUT: json.dumps(about)})
+def test_every_flipped_bit_is_seen(file, tmp_path):
+    """In the metadata, in the numbers and in the checksum itself."""
+    whole, broken = file.read_bytes(), tmp_path / "broken"
+    for bit in np.random.default_rng(0).integers(8 * len(whole), size=60):
+        changed = bytearray(whole)
+        changed[bit // 8] ^= 1 << bit % 8
+        broken.write_bytes(changed)
+        with pytest.raises(ValueError, match="broken: "):
+            jrcjax.load_agent(broken)
+
+
+def rewritten(file, target, about=None, tensors=None):
+    """A copy that says something else, sealed as if it were meant."""
+    there = layout.read(file)
+    tensors = {name: value for name, value in (there.tensors | (tensors or {})).items() if value is not None}
+    target.write_bytes(layout.content_of(tensors, {**there.about, **(about or {})}))
     return target
 
 
-def test_files_of_another_version_or_shape_are_refused(file, tmp_path):
-    with pytest.raises(ValueError, match="new: version 2; allowed: 1"):
-        jrcjax.load_agent(rewritten(file, tmp_path / "new", {"version": 2}))
-    with agent_file.opened(file) as (_, about):
-        wider = about["config"] | {"hidden": [9]}
+TAMPERED = {
+    "version": ({"version": "3"}, None, "version: \"'3'\"; allowed: 3"),
+    "another version": ({"version": 4}, None, "version: '4'; allowed: 3"),
+    "another field": ({"more": 1}, None, "jrcjax agents: .*more.*; allowed: version, learners"),
+    "no learners": ({"learners": []}, None, r"learners: '\[\]'; allowed: a list"),
+    "an unknown learner": ({"learners": ["sarsa"]}, None, "learners: 'sarsa' is unknown"),
+    "nested learners": ({"learners": [["ddqn"]]}, None, r"learners: \['ddqn'\] is unknown"),
+    "a learner that is not there": ({"learners": ["ddqn", "dpr"]}, None, "agents.dpr.key: 'missing'"),
+    "too many points": ({"points": 10**9}, None, "points: 1000000000; allowed"),
+    "more points than there are": ({"points": 10**6}, None, r"params.*: 'float32 of shape \(1,.*; allowed"),
+    "points as a text": ({"points": "1"}, None, "points: "),
+    "seeds of another kind": ({"seeds": ["0"]}, None, "seeds: "),
+    "one seed twice": ({"seeds": [0, 0]}, None, "seeds: .*a list of different ones"),
+    "no configuration": ({"config": None}, None, "config: 'None'; allowed: an object with episodes"),
+    "half a configuration": ({"config": {"episodes": 3}}, None, "config: .*; allowed: an object with episodes"),
+    "no settings": ({"settings": {}}, None, "settings: .*; allowed: an object with"),
+    "an unknown generator": ({"key_implementation": "mt19937"}, None, "key_implementation: .*allowed: 'threefry2x32'"),
+    "no provenance": ({"provenance": 3}, None, "provenance: '3'; allowed: an object"),
+    "a prior that is none": (None, {"params.speed.prior": np.full((1, 2), np.nan, np.float32)}, "speed.prior: "),
+    "a bank above 1": (None, {"params.radar.miss_bank": np.full((1, 2, 8), 2, np.float32)}, "radar.miss_bank: "),
+    "a discount that is none": (None, {"hparams.discount": np.full(1, np.nan, np.float32)}, "hparams.discount: "),
+    "a missing field": (None, {"hparams.discount": None}, "hparams.discount: 'missing'"),
+    "another type": (None, {"hparams.discount": np.full(1, 0.9)}, "hparams.discount: 'float64 of shape"),
+    "more than that": (None, {"hparams.warmth": np.zeros(1, np.float32)}, "tensors: 'hparams.warmth'"),
+}
+
+
+@pytest.mark.parametrize("kind", TAMPERED)
+def test_a_file_of_others_is_refused_by_field(kind, file, tmp_path):
+    about, tensors, message = TAMPERED[kind]
+    with pytest.raises(ValueError, match=f"other: {message}") as error:
+        jrcjax.load_agent(rewritten(file, tmp_path / "other", about, tensors))
+    assert len(str(error.value)) < 2000
+
+
+@pytest.mark.parametrize("number", [np.nan, np.inf])
+def test_an_agent_that_diverged_is_refused(number, file, tmp_path):
+    name = next(name for name in layout.read(file).tensors if name.startswith("agents.ddqn.weights"))
+    tensor = layout.read(file).tensors[name].copy()
+    tensor[..., 0] = number
+    with pytest.raises(ValueError, match=rf"other: {name}: .*; allowed: finite numbers"):
+        jrcjax.load_agent(rewritten(file, tmp_path / "other", tensors={name: tensor}))
+
+
+def test_a_file_of_another_shape_is_refused(file, tmp_path):
+    wider = layout.read(file).about["config"] | {"hidden": [9]}
     with pytest.raises(ValueError, match=r"agents.ddqn: .*\(8, 5\).*allowed: .*\(9, 5\)"):
         jrcjax.load_agent(rewritten(file, tmp_path / "wider", {"config": wider}))
+
+
+def test_any_reader_of_safetensors_reads_the_file(file):
+    assert load_file(file)["hparams.discount"] == np.float32(0.9)
+
+
+def test_numbers_as_people_write_them_are_saved(trained, params, tmp_path):
+    hparams, params = jrcjax.HParams(learning_rate=3e-4, discount=0.9), params.replace(event_model=1)
+    agent = trained["ddqn"][0]
+    path = jrcjax.save_agent(tmp_path / "agent", agent, params, hparams, learner="ddqn", config=CONFIG)
+    loaded = jrcjax.load_agent(path)
+    assert (loaded.hparams.learning_rate, loaded.params.event_model) == (np.float32(3e-4), 1)
 
 
 def test_an_interrupted_save_leaves_the_old_file(file, trained, params, monkeypatch):
@@ -303,10 +375,8 @@ def small(params):
         name="small",
         description="",
         learners=("q_learning", "round_robin", "ddqn"),
-        x_name="discount",
-        x_values=(0.5, 0.9),
-        params_at=lambda x, preset: params.replace(reward_weights=jnp.asarray([x, 100.0, 1.0, 50.0], jnp.float32)),
-        hparams_at=lambda x: jrcjax.HParams(discount=jnp.float32(x)),
+        environment=to_toml(params),
+        design=along("discount", "hparams.discount", (0.5, 0.9)),
     )
 
 
@@ -322,8 +392,8 @@ def test_an_agent_of_a_sweep_is_the_one_that_its_results_tell_of(folder, small, 
     assert (agent.learner, agent.point, agent.seed) == (learner, point, seed)
     told = store.load(folder, 2).sel(algorithm=learner, seed=seed).isel(point=point, episode=-1)
     np.testing.assert_allclose(agent.evaluate(episodes=1).exact.reward, float(told["policy_reward"]), rtol=1e-5)
-    assert_same((agent.params, agent.hparams), jax.tree.map(lambda a: a[point], tuple(points_of(small, "paper"))))
-    assert agent.hparams.discount == np.float32(small.x_values[point])
+    assert_same((agent.params, agent.hparams), jax.tree.map(lambda a: a[point], tuple(Job(small, SIZE).points)))
+    assert agent.hparams.discount == np.float32((0.5, 0.9)[point])
 
 
 @pytest.mark.parametrize(

@@ -43,7 +43,7 @@ def test_a_platform_that_is_not_there_is_one_line():
 
 @pytest.mark.parametrize("locale", [{"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"}])
 def test_any_character_is_shown_in_any_locale(locale):
-    code = "from sweeps.command import any_character; any_character(); print('\\u03c9 = 27')"
+    code = "from sweeps.command import undisturbed; undisturbed(); print('\\u03c9 = 27')"
     done = run_python(code, **locale)
     assert (done.returncode, done.stdout) == (0, "\\u03c9 = 27\n"), done.stderr
 

@@ -7,15 +7,17 @@ import pytest
 import xarray as xr
 
 import jrcjax
-from jrcjax.config.paths import parameter_at
+from jrcjax.config.paths import Points, parameter_at
+from jrcjax.config.stacking import with_value
 from jrcjax.model.params import Factor
 from jrcjax.readings import EventModel
 from paper_figs.plots import curves
 from sweeps.__main__ import main
-from sweeps.engine.program import Points, points_of
-from sweeps.engine.sources import SOURCE
+from sweeps.engine.job import Job
 from sweeps.studies.custom import Options, custom_sweep
 from sweeps.studies.registry import SWEEPS
+from sweeps.studies.source import SOURCE
+from sweeps.sweep import SMOKE, Size
 
 TENTHS = "0.1:0.9:9"
 
@@ -29,6 +31,14 @@ def assert_same(found, wanted):
     jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, rtol=1e-6), found, wanted)
 
 
+def points_of(sweep):
+    return Job(sweep, Size()).points
+
+
+def at(point, path, value):
+    return with_value(point, parameter_at(path, point), value)
+
+
 @pytest.mark.parametrize(
     ("name", "vary"),
     [
@@ -38,29 +48,86 @@ def assert_same(found, wanted):
     ],
 )
 def test_the_papers_sweeps_can_be_asked_for(name, vary):
-    sweep = custom_sweep(Options(vary=vary), "paper").sweep
-    assert sweep.x_values == SWEEPS[name].x_values
-    assert_same(points_of(sweep, "paper"), points_of(SWEEPS[name], "paper"))
+    sweep = custom_sweep(Options(vary=(vary,)), "paper")
+    assert sweep.design.rows == SWEEPS[name].design.rows
+    assert_same(points_of(sweep), points_of(SWEEPS[name]))
 
 
 def test_hyperparameters_and_readings_vary_and_others_are_set():
-    options = Options(vary="hparams.discount=0.5,0", set=("env.event_model=marginal", "hparams.target_period=7"))
-    sweep = custom_sweep(options, "paper").sweep
-    points = points_of(sweep, "paper")
+    options = Options(vary=("hparams.discount=0.5,0",), set=("env.event_model=marginal", "hparams.target_period=7"))
+    points = points_of(custom_sweep(options, "paper"))
     np.testing.assert_allclose(points.hparams.discount, [0.0, 0.5])
     np.testing.assert_array_equal(points.hparams.target_period, 7)
     np.testing.assert_array_equal(points.params.event_model, EventModel.MARGINAL)
-    own = custom_sweep(Options(vary="env.event_model=noisy_or,conditional"), "paper")
-    assert own.sweep.x_values == (0.0, 2.0)
-    assert points_of(own.sweep, "paper").params.event_model.dtype == np.int32
+    own = custom_sweep(Options(vary=("env.event_model=noisy_or,conditional",)), "paper")
+    assert own.design.rows == ((0.0,), (2.0,))
+    assert points_of(own).params.event_model.dtype == np.int32
 
 
-def test_densities_beyond_those_of_the_base_share_one_shape(environments, monkeypatch):
-    base = environments["short-target"]
-    monkeypatch.setattr("sweeps.studies.custom._base", lambda base_name, preset: base)
-    sweep = custom_sweep(Options(vary="env.radar.density=10,40"), "paper").sweep
-    params = points_of(sweep, "paper").params  # which checks that the banks fit
-    np.testing.assert_array_equal(params.radar.density, [10.0, 40.0])
+def test_several_parameters_give_the_grid_and_settings_their_programs():
+    rate, optimiser = "hparams.learning_rate", "config.optimiser"
+    sweep = custom_sweep(
+        Options(vary=(f"{rate}=1e-4,1e-3", f"{optimiser}=adam,sgd"), learners=("ddqn", "dpr")), "paper"
+    )
+    assert sweep.design.rows == ((1e-4, 0.0), (1e-4, 1.0), (1e-3, 0.0), (1e-3, 1.0))
+    job = Job(sweep, SMOKE)
+    assert [(g.rows, g.config.optimiser) for g in job.groups] == [((0, 2), "adam"), ((1, 3), "sgd")]
+    np.testing.assert_array_equal(job.points.hparams.learning_rate, np.float32([1e-4, 1e-4, 1e-3, 1e-3]))
+    # The source agents are trained with the same, each combination once.
+    assert sweep.source.design.rows == sweep.design.rows
+    assert sweep.source_points == (0, 1, 2, 3)
+    of_table1 = custom_sweep(Options(vary=(f"{rate}=1e-4,1e-3",), learners=("dpr",), source="table1"), "paper")
+    assert of_table1.source is SOURCE
+    # What the source's learner does not read needs no source agents of its own.
+    assert custom_sweep(Options(vary=("hparams.margin=1,2",), learners=("tlwd",)), "paper").source is SOURCE
+    both = Options(vary=("hparams.margin=1,2", f"{rate}=1e-4,1e-3"), learners=("tlwd",))
+    assert custom_sweep(both, "paper").source_points == (0, 1, 0, 1)
+
+
+def test_a_sample_fills_its_ranges_and_begins_like_a_larger_one():
+    vary = (
+        "hparams.learning_rate=1e-6:1e-2:log",
+        "config.optimiser=adam,sgd",
+        "hparams.target_period=1:4",
+        "hparams.margin=2:3",
+    )
+    few, many = (custom_sweep(Options(vary=vary, sample=n, sample_seed=5), "paper").design for n in (20, 64))
+    assert many.rows[:20] == few.rows
+    rate = np.log10(many.values("hparams.learning_rate"))
+    counts, _ = np.histogram(rate, np.linspace(-6, -2, 9))
+    np.testing.assert_array_equal(counts, 8)  # as even as a Sobol' sequence is
+    np.testing.assert_array_equal(np.unique(many.values("config.optimiser"), return_counts=True)[1], 32)
+    np.testing.assert_array_equal(
+        np.unique(many.values("hparams.target_period"), return_counts=True), [[1, 2, 3, 4], [16] * 4]
+    )
+    assert custom_sweep(Options(vary=vary, sample=20, sample_seed=6), "paper").design.rows != few.rows
+
+
+def test_a_table_gives_any_points_and_its_empty_cells_are_the_base(tmp_path):
+    file = tmp_path / "points.csv"
+    file.write_text("env.event_model, hparams.margin\nmarginal, 2\n, 0.5\nnoisy_or,\n")
+    sweep = custom_sweep(Options(table=file), "paper")
+    points = points_of(sweep)
+    np.testing.assert_array_equal(points.params.event_model, [1, 0, 2])
+    np.testing.assert_array_equal(points.hparams.margin, [2.0, 0.5, 1.0])
+    for text, message in (
+        ("env.event_model\n", "allowed: a line of paths"),
+        ("env.event_model,hparams.margin\nmarginal\n", "allowed: a line of paths"),
+        ("env.event_model,env.event_model\nmarginal,marginal\n", "allowed: each column once"),
+        ("env.evnt_model\nmarginal\n", "'evnt_model'; allowed: after env one of"),
+        ("env.event_model\nmarginl\n", "env.event_model: 'marginl'; allowed: conditional, marginal"),
+        ("env.all.prior.low,env.road.prior.high\n0.5,0.5\n", "allowed: columns that do not set the same number"),
+    ):
+        file.write_text(text)
+        with pytest.raises(ValueError, match=message):
+            custom_sweep(Options(table=file), "paper")
+
+
+def test_densities_beyond_those_of_the_base_share_one_shape(environments, tmp_path):
+    base, file = environments["short-target"], tmp_path / "short.toml"
+    jrcjax.save_params(file, base)
+    params = points_of(custom_sweep(Options(vary=("env.radar.density=10,40",), base=str(file)), "paper")).params
+    np.testing.assert_array_equal(params.radar.density, [10.0, 40.0])  # whose banks fit, or it would be refused
     np.testing.assert_array_equal(params.radar.miss_bank[0], base.radar.miss_bank)
     assert params.radar.max_objects[1] > base.radar.max_objects[1]
 
@@ -71,12 +138,12 @@ def three_level_roads(params):
 
 def test_an_entry_of_a_distribution_takes_from_the_others_in_proportion(point):
     base = point._replace(params=three_level_roads(point.params))
-    after = parameter_at("env.road.prior.1", base).set_in(base, 0.4)
+    after = at(base, "env.road.prior.1", 0.4)
     np.testing.assert_allclose(after.params.road.prior, [0.6 * 5 / 7, 0.4, 0.6 * 2 / 7], rtol=1e-6)
     jrcjax.check_params(after.params)
-    certain = parameter_at("env.road.prior.0", base).set_in(base, 1.0)
+    certain = at(base, "env.road.prior.0", 1.0)
     np.testing.assert_array_equal(certain.params.road.prior, [1.0, 0.0, 0.0])
-    none = parameter_at("env.road.prior.0", base).set_in(certain, 0.0)
+    none = at(certain, "env.road.prior.0", 0.0)
     np.testing.assert_array_equal(none.params.road.prior, [0.0, 0.5, 0.5])
     with pytest.raises(ValueError, match=r"one of 0, 1, 2$"):
         parameter_at("env.road.prior.low", base)
@@ -101,8 +168,9 @@ def test_values_are_read_as_a_person_means_them(path, text, values, point):
 @pytest.mark.parametrize(
     ("path", "message"),
     [
-        ("speed.prior.0", "speed.prior.0: 'speed'; allowed: env or hparams before the first dot"),
-        ("config.batch_size", "allowed: env or hparams .* Config decide shapes"),
+        ("speed.prior.0", "speed.prior.0: 'speed'; allowed: env, hparams, config before the first dot"),
+        ("config.episodes", "'episodes'; allowed: after config one of batch_size, "),
+        ("config.hidden.0", "'hidden'; allowed: after config one of batch_size, "),
         ("env.sped.prior.0", "env.sped.prior.0: 'sped'; allowed: after env one of channel, road, weather, speed"),
         ("env.speed", "env.speed: ''; allowed: after env.speed one of prior, event_probability, persistence"),
         ("env.speed.prior.2", "'2'; allowed: after env.speed.prior one of 0, 1, low, high"),
@@ -130,7 +198,10 @@ def test_paths_that_lead_nowhere_are_refused_with_the_way_on(path, message, poin
         ("hparams.discount", "0:1:1", r"allowed: start:stop:count"),
         ("hparams.discount", "0:1:3:4", r"allowed: start:stop:count"),
         ("hparams.discount", "0:1:3:log", "allowed: numbers > 0 on a logarithmic scale"),
-        ("hparams.discount", "0.5,0.5", "allowed: values that differ"),
+        ("hparams.discount", "0.5,0.5", "allowed: values that differ in float32"),
+        ("hparams.discount", "0.5,0.5000000001", "allowed: values that differ in float32"),
+        ("hparams.discount", "1e-60", "allowed: a number that fits float32, and is not 0 in it"),
+        ("hparams.target_period", "3e9", "allowed: a number that fits 32 bits"),
         ("hparams.target_period", "1.5", "hparams.target_period: '1.5'; allowed: an integer"),
         ("env.event_model", "0", "env.event_model: '0'; allowed: conditional, marginal, noisy_or"),
         ("env.event_model", "0:2:3", "allowed: conditional, marginal, noisy_or"),
@@ -150,6 +221,22 @@ def test_values_that_mean_nothing_are_refused(path, text, message, point):
         (["--vary", "hparams.discount=0.5,1"], "hparams.discount: 1.0; allowed: a number in [0, 1)"),
         (["--vary", "env.radar.density=-1,5"], "radar.density: -1.0; allowed: a number of objects > 0"),
         (["--vary", "hparams.margin=5,9", "--set", "hparams.margin=7"], "set: 'hparams.margin'; allowed: another"),
+        (
+            ["--vary", "hparams.margin=5,9", "--vary", "hparams.margin=7"],
+            "vary: 'hparams.margin'; allowed: each path once",
+        ),
+        (["--vary", "env.all.prior.low=.5,.6", "--vary", "env.road.prior.high=.5"], "allowed: columns that do not set"),
+        (
+            ["--vary", "hparams.margin=0:1:999", "--vary", "hparams.discount=0:.9:999"],
+            "'a grid of 998001 points'; allowed",
+        ),
+        (
+            ["--vary", "hparams.margin=0:1:400", "--vary", "hparams.discount=0:.9:90"],
+            "points x 1 seeds x 1 learners'; allow",
+        ),
+        (["--vary", "hparams.margin=1:0", "--sample", "8"], "hparams.margin: '1:0'; allowed: low < high"),
+        (["--vary", "hparams.margin=0:1", "--sample", "1"], "sample: 1; allowed: an int from 2 to 100000"),
+        (["--vary", "env.radar.density=5,9", "--source", "x"], "source: 'x' is unknown; allowed: 'same', 'table1'"),
         (["--vary", "env.radar.density=5,9", "--set", "foo"], "set: 'foo'; allowed: PATH=VALUE"),
         (["--vary", "env.radar.density=5,9", "--learners", "sarsa"], "learners: 'sarsa' is unknown; allowed:"),
         (["--vary", "env.radar.density=5,9", "--learners", "ddqn", "ddqn"], "allowed: one or more different learners"),
@@ -170,24 +257,25 @@ def test_other_sweeps_do_not_take_these_options(capsys, tmp_path):
     assert "name: 'fig6'; allowed: custom, for which alone --vary is" in capsys.readouterr().err
 
 
-def test_learners_that_transfer_bring_sources_where_their_environment_allows(point, monkeypatch):
-    vary = "hparams.discount=0.5,0.9"
-    assert custom_sweep(Options(vary=vary), "paper").sweep.source is None
-    assert custom_sweep(Options(vary=vary, learners=("ddqn", "tlwd")), "paper").sweep.source is SOURCE
-    monkeypatch.setattr("sweeps.studies.custom._base", lambda base, preset: three_level_roads(point.params))
-    assert custom_sweep(Options(vary=vary), "paper").sweep.source is None
+def test_learners_that_transfer_bring_sources_where_their_environment_allows(point, tmp_path):
+    vary = ("env.event_model=marginal,noisy_or",)
+    assert custom_sweep(Options(vary=vary), "paper").source is None
+    assert custom_sweep(Options(vary=vary, learners=("ddqn", "tlwd")), "paper").source is SOURCE
+    file = tmp_path / "three.toml"
+    jrcjax.save_params(file, three_level_roads(point.params))
+    assert custom_sweep(Options(vary=vary, base=str(file)), "paper").source is None
     with pytest.raises(ValueError, match="learners: 'dpr'; allowed: learners without transfer"):
-        custom_sweep(Options(vary=vary, learners=("ddqn", "dpr")), "paper")
+        custom_sweep(Options(vary=vary, learners=("ddqn", "dpr"), base=str(file)), "paper")
 
 
 def test_the_base_may_be_a_file(tmp_path):
     file = tmp_path / "short.toml"
     file.write_text('environment = "source"\nmax_steps_in_episode = 7\n')
-    own = custom_sweep(Options(vary="hparams.discount=0.5,0.9", base=str(file)), "paper")
-    assert own.slots == 7
-    np.testing.assert_array_equal(own.sweep.params_at(0.5, "paper").nearby.prior, [np.float32(0.3), np.float32(0.7)])
+    job = Job(custom_sweep(Options(vary=("hparams.discount=0.5,0.9",), base=str(file)), "paper"), SMOKE)
+    assert job.spec.episode_slots == 7
+    np.testing.assert_array_equal(job.points.params.nearby.prior[1], [np.float32(0.3), np.float32(0.7)])
     with pytest.raises(FileNotFoundError):
-        custom_sweep(Options(vary="hparams.discount=0.5,0.9", base="absent.toml"), "paper")
+        custom_sweep(Options(vary=("hparams.discount=0.5,0.9",), base="absent.toml"), "paper")
 
 
 def test_one_command_runs_and_draws_it(capsys, tmp_path):

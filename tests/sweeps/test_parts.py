@@ -20,11 +20,17 @@ from rich.console import Console
 from jrcjax import files
 from sweeps import interrupts
 from sweeps.__main__ import main
-from sweeps.engine import run, sources
+from sweeps.design import along
+from sweeps.engine import run
+from sweeps.engine.block import compute
+from sweeps.engine.job import Job
 from sweeps.engine.run import run_sweep
+from sweeps.engine.sources import sources_of
 from sweeps.engine.verify import made_elsewhere, sample_of, verify
 from sweeps.results import parts, store
+from sweeps.results.configuration import digest_of
 from sweeps.studies.registry import EVERY_SWEEP, STUDIES, SWEEPS
+from sweeps.studies.source import SOURCE
 from sweeps.sweep import Size, Study
 
 ROOT = Path(__file__).parents[2]
@@ -188,9 +194,9 @@ def test_a_run_under_another_setting_of_jax_is_not_continued(setting, value, fol
 
 
 def test_the_digest_of_environments_tells_banks_apart():
-    params = run.points_of(CHEAP, "paper").params
+    params = Job(CHEAP, SIZE).points.params
     other = jax.tree.map(lambda leaf: leaf + 0.5 if leaf is params.radar.miss_bank else leaf, params)
-    assert store.digest_of(params) != store.digest_of(other)
+    assert digest_of(params) != digest_of(other)
 
 
 @pytest.mark.parametrize("kind", ["pipe", "dangling", "loop"])
@@ -233,14 +239,14 @@ def test_a_second_run_says_that_the_folder_is_in_use(folder):
 
 def test_damaged_source_agents_are_trained_again(tmp_path, capsys):
     size = Size(seeds=2, episodes=1, pretraining=2, demonstrations=30)
-    first = sources.sources_of(sources.SOURCE, size, range(2), tmp_path, lambda seconds: None)
+    first = sources_of(Job(SOURCE, size), range(2), tmp_path)
     part, manifest = store.part_path(tmp_path / "source", range(2)), tmp_path / "source" / store.MANIFEST
     told = manifest.read_bytes()
     manifest.unlink()  # as a process leaves it that is killed between a part and its manifest
-    sources.sources_of(sources.SOURCE, size, range(2), tmp_path, lambda seconds: None)
+    sources_of(Job(SOURCE, size), range(2), tmp_path)
     assert manifest.read_bytes() == told
     part.write_bytes(flipped(part.read_bytes(), 4321))
-    again = sources.sources_of(sources.SOURCE, size, range(2), tmp_path, lambda seconds: None)
+    again = sources_of(Job(SOURCE, size), range(2), tmp_path)
     assert "set aside" in capsys.readouterr().err
     jax.tree.map(np.testing.assert_array_equal, first, again)
 
@@ -257,18 +263,18 @@ import numpy as np
 import xarray as xr
 from rich.console import Console
 from sweeps.engine import run
+from sweeps.engine.block import Block
 from sweeps.results import store
 from sweeps.studies.registry import SWEEPS
 from sweeps.sweep import Size
 
-def made_up(sweep, size, points, reference, seeds, source, advance, keep):
+def made_up(job, seeds, chunks):
     rewards = np.stack([np.random.default_rng(seed).normal(size=20_000) for seed in seeds])
     about = {"configuration": '{"sweep": "fig5a"}', "provenance": '{"finished": "now"}'}
-    return xr.Dataset({"reward": (("seed", "episode"), rewards)}, {"seed": np.array(seeds)}, about)
+    return Block(seeds, xr.Dataset({"reward": (("seed", "episode"), rewards)}, {"seed": np.array(seeds)}, about), {})
 
-run.results_of = made_up
-run.points_of = run.reference_of = lambda *args: None
-store.configuration = lambda sweep, size: {"sweep": "fig5a"}
+run.block_of = made_up
+store.configuration = lambda job: {"sweep": "fig5a"}
 
 def go(out):
     run.run_sweep(SWEEPS["fig5a"], Size(seeds=320), out, Console(quiet=True), resume=True)
@@ -355,9 +361,7 @@ def test_a_seed_has_the_same_bits_on_two_devices_three_and_a_single_core(tmp_pat
 @pytest.mark.parametrize("seeds", [range(2, 3), range(1, 4), range(0, 40)])
 def test_a_seed_has_the_same_bits_alone_and_among_others(seeds, untouched):
     size = replace(SIZE, seeds=seeds.stop)
-    points = run.points_of(CHEAP, size.preset)
-    reference = run.reference_of(points, size.episodes)
-    data = run.results_of(CHEAP, size, points, reference, seeds, None, lambda seconds: None)
+    data = compute(Job(CHEAP, size), seeds).results
     common = sorted(set(seeds) & set(range(3)))
     there = store.load(untouched, 3).sel(seed=common)
     assert data.sel(seed=common).drop_attrs().identical(there.drop_attrs())
@@ -384,8 +388,8 @@ def test_verifying_says_where_and_how_much_results_differ(folder, monkeypatch, c
 
 
 def test_verifying_refuses_results_of_another_configuration(folder):
-    changed = replace(CHEAP, x_values=(1.0,))
-    with pytest.raises(store.ConfigurationMismatch, match=r"x\.environment: \[0\.0\] there, \[1\.0\] wanted"):
+    changed = replace(CHEAP, design=along("density", "env.radar.density", (9.0,)))
+    with pytest.raises(store.ConfigurationMismatch, match=r"design\.density: null there, \[9\.0\] wanted"):
         verify(folder, None, {"cheap": changed})
     with pytest.raises(ValueError, match="results of the sweep 'cheap'"):
         verify(folder, None, {})
@@ -486,7 +490,7 @@ def test_an_interrupted_sweep_tells_what_is_saved(folder, monkeypatch, capsys):
         raise KeyboardInterrupt
 
     monkeypatch.setitem(STUDIES, "cheap", Study("cheap", "", (CHEAP,)))
-    monkeypatch.setattr(run, "results_of", interrupted)
+    monkeypatch.setattr(run, "block_of", interrupted)
     arguments = ["run", "cheap", "--seeds", "4", "--episodes", "1", "--out", str(folder.parent), "--resume"]
     assert main(arguments) == 130
     said = " ".join(capsys.readouterr().err.split())

@@ -9,14 +9,12 @@ import pytest
 
 import jrcjax
 from jrcjax.config.toml import save_params
-from jrcjax.readings import CountingRule, Distance
 from paper_figs.__main__ import main as figures_main
 from sweeps.__main__ import main as sweeps_main
-from sweeps.engine.estimate import seconds_per_episode
-from sweeps.engine.program import points_of
+from sweeps.engine.estimate import block_seconds
+from sweeps.engine.job import Job
 from sweeps.preset import check_preset, environment_of, preset_of, slots_of
-from sweeps.results.store import digest_of
-from sweeps.studies.multiverse import UNIVERSES, read_as
+from sweeps.results.configuration import digest_of
 from sweeps.studies.registry import SWEEPS
 from sweeps.sweep import Size, Study, size_of
 
@@ -56,10 +54,10 @@ def test_a_file_changes_both_environments_and_its_density_is_the_targets(traffic
 
 def test_a_figures_own_parameter_replaces_the_files(traffic):
     preset = preset_of(str(traffic))
-    radars = points_of(SWEEPS["fig8"], preset).params.radar
-    np.testing.assert_array_equal(radars.density, SWEEPS["fig8"].x_values)
+    radars = Job(SWEEPS["fig8"], Size(preset=preset)).points.params.radar
+    np.testing.assert_array_equal(radars.density, SWEEPS["fig8"].design.values("density"))
     assert set(np.asarray(radars.size_mean[:, 0, 0])) == {4.5}
-    assert set(np.asarray(points_of(SWEEPS["fig7"], preset).params.radar.density)) == {30.5}
+    assert set(np.asarray(Job(SWEEPS["fig7"], Size(preset=preset)).points.params.radar.density)) == {30.5}
 
 
 def test_comments_order_and_the_name_of_the_target_do_not_matter(traffic, tmp_path):
@@ -83,25 +81,13 @@ def test_a_whole_environment_may_be_a_preset(tmp_path, target):
     assert digest_of(environment_of("target", preset_of(str(file)))) == digest_of(target)
 
 
-def test_universes_take_the_sizes_from_the_file(traffic):
-    params = environment_of("target", preset_of(str(traffic)))
-    of_resolution = {universe.resolution: universe for universe in UNIVERSES}
-    assert len(of_resolution) == 3
-    for (distance, rule), universe in of_resolution.items():
-        radar = read_as(params, universe).radar
-        assert float(radar.density) == 30.5
-        np.testing.assert_array_equal(radar.size_mean, [[4.5, 2.0], [0.75, 0.5]])
-        assert (Distance.names()[int(radar.distance)], CountingRule.names()[int(radar.counting_rule)]) == (
-            distance,
-            rule,
-        )
-
-
 def test_slots_of_an_episode_are_those_of_the_file(traffic):
     traffic.write_text(f"max_steps_in_episode = 60\n{TRAFFIC}")
     preset = preset_of(str(traffic))
     assert (slots_of(preset), slots_of("paper")) == (60, 300)
-    of_file, of_paper = (seconds_per_episode(SWEEPS["fig8"], Size(preset=p), 8) for p in (preset, "paper"))
+    of_file, of_paper = (
+        block_seconds(Job(SWEEPS["fig8"], Size(preset=p, pretraining=0)), 8) for p in (preset, "paper")
+    )
     np.testing.assert_allclose(of_file, of_paper / 5)
 
 

@@ -20,11 +20,15 @@ from jrcjax.training.source import train_source
 from jrcjax.training.train import train
 from jrcjax.training.transfer import target_key
 from sweeps.__main__ import main
-from sweeps.engine.program import chunk_of, joined, points_of, reference_of
+from sweeps.design import Column, Design, along
+from sweeps.engine.job import Job
+from sweeps.engine.program import chunk_of, joined
 from sweeps.engine.run import blocks, expected_seconds, run_sweep
-from sweeps.engine.sources import SOURCE, missing_sources, sources_of
+from sweeps.engine.sources import missing_sources, sources_of
 from sweeps.results import store
+from sweeps.results.configuration import configuration, digest_of
 from sweeps.studies.registry import STUDIES, SWEEPS
+from sweeps.studies.source import SOURCE
 from sweeps.sweep import SMOKE, Size, size_of
 
 FIG5A = SWEEPS["fig5a"]
@@ -83,10 +87,10 @@ def test_a_part_of_another_configuration_is_refused_also_without_a_manifest(tmp_
 
 
 def test_the_digest_sees_every_number_of_an_environment():
-    points = points_of(FIG5A, "paper").params
+    points = Job(FIG5A, SIZE).points.params
     other = points.replace(reward_weights=points.reward_weights.at[0, 2].add(1e-6))
-    assert store.digest_of(points) == store.digest_of(points_of(FIG5A, "paper").params)
-    assert store.digest_of(points) != store.digest_of(other)
+    assert digest_of(points) == digest_of(Job(FIG5A, SIZE).points.params)
+    assert digest_of(points) != digest_of(other)
 
 
 def test_results_know_how_they_were_made_without_git(monkeypatch):
@@ -154,11 +158,11 @@ def test_groups_are_joined_on_the_host_since_an_exchange_between_devices_can_sta
 
 
 def test_the_reference_of_stacked_points_is_that_of_each_alone():
-    points = points_of(FIG5A, "paper_table")
-    assert points.params.radar.density.shape == (1,)
+    job = Job(FIG5A, Size(episodes=150, preset="paper_table"))
+    assert job.points.params.radar.density.shape == (1,)
     params = jrcjax.paper_params("source", "paper_table")
     best = exact.evaluate_policy(params, exact.optimal_policy(params))
-    reference = reference_of(points, 150)
+    reference = job.reference
     np.testing.assert_allclose(reference.optimum.reward[0], best.reward, rtol=1e-6)
     # Episode 151 and all after it explore with the smallest epsilon, episode 1 with nearly the largest.
     for episode, epsilon in ((149, 0.01), (0, 1 - 0.99 * 149.5 / 30_000)):
@@ -209,12 +213,19 @@ def test_keys_of_seeds_do_not_depend_on_how_many_there_are():
 # --- Sweeps that transfer ---------------------------------------------------------------------------------------------
 
 TINY = Size(seeds=2, episodes=2, pretraining=12, demonstrations=70)
+_P, _ALPHA = "env.speed.event_probability.high", "hparams.priority_exponent"
 PAIR = replace(
     SWEEPS["fig6"],
     name="pair",
-    x_values=(0.1, 0.9),
-    hparams_at=lambda x: jrcjax.HParams(priority_exponent=jnp.float32(0.0 if x > 0.5 else 0.4)),
+    design=Design((Column(_P, _P), Column(_ALPHA, _ALPHA)), ((0.1, None), (0.9, 0.0))),
 )
+
+
+def point_of(sweep, number):
+    """Environment, hyperparameters and settings of one point."""
+    job = Job(sweep, TINY)
+    (config,) = [group.config for group in job.groups if number in group.rows]
+    return *jax.tree.map(lambda leaf: leaf[number], job.points), config
 
 
 @pytest.fixture(scope="module")
@@ -222,18 +233,19 @@ def pair(tmp_path_factory):
     return run_sweep(PAIR, TINY, tmp_path_factory.mktemp("results"), QUIET, resume=False)
 
 
-@pytest.mark.parametrize(("point", "x"), [(0, 0.1), (1, 0.9)])
-def test_a_seed_of_a_transfer_sweep_is_a_single_run_of_that_key(pair, point, x):
+@pytest.mark.parametrize("point", [0, 1])
+def test_a_seed_of_a_transfer_sweep_is_a_single_run_of_that_key(pair, point):
     data = store.load(pair, TINY.seeds)
     key = jax.random.fold_in(jax.random.key(0), 1)
-    source, target = jrcjax.paper_params("source"), PAIR.params_at(x, "paper")
-    alone = jrcjax.transfer(key, source, target, PAIR.hparams_at(x), config=PAIR.config(TINY), learners=PAIR.learners)
+    target, hparams, config = point_of(PAIR, point)
+    source = jrcjax.paper_params("source")
+    alone = jrcjax.transfer(key, source, target, hparams, config=config, learners=PAIR.learners)
     for learner in PAIR.learners:
         swept = data.sel(algorithm=learner, seed=1).isel(point=point)
         for name in ("reward", "throughput", "miss_detection", "policy_reward"):
             # Batched and single programs round differently, which 600 slots of training do not amplify beyond this.
             np.testing.assert_allclose(swept[name].values, getattr(alone.logs[learner], name), rtol=1e-4)
-    kept = sources_of(SOURCE, TINY, range(2), pair.parent, lambda seconds: None)
+    kept = sources_of(Job(SOURCE, TINY), range(2), pair.parent)
     for held, wanted in zip(jax.tree.leaves(kept), jax.tree.leaves(alone.source), strict=True):
         np.testing.assert_allclose(held[0, 1], wanted, rtol=1e-4, atol=1e-5)
 
@@ -241,16 +253,16 @@ def test_a_seed_of_a_transfer_sweep_is_a_single_run_of_that_key(pair, point, x):
 def test_source_agents_are_trained_once_for_all_sweeps(pair):
     part = store.part_path(pair.parent / "source", range(0, 2))
     before = part.read_bytes()
-    assert missing_sources(SOURCE, TINY, range(2), pair.parent) == range(0)
-    assert missing_sources(SOURCE, TINY, range(4), pair.parent) == range(2, 4)
+    assert missing_sources(Job(SOURCE, TINY), range(2), pair.parent) == range(0)
+    assert missing_sources(Job(SOURCE, TINY), range(4), pair.parent) == range(2, 4)
     run_sweep(replace(PAIR, name="other", learners=("dpr",)), TINY, pair.parent, QUIET, resume=False)
     assert part.read_bytes() == before
     assert [path.name for path in (pair.parent / "source").glob("*.nc")] == [part.name]
 
 
 def test_sources_come_back_from_disk_as_they_were(pair):
-    trained = sources_of(SOURCE, TINY, range(2), pair.parent, lambda seconds: None)
-    some = sources_of(SOURCE, TINY, range(1, 2), pair.parent, lambda seconds: None)
+    trained = sources_of(Job(SOURCE, TINY), range(2), pair.parent)
+    some = sources_of(Job(SOURCE, TINY), range(1, 2), pair.parent)
     assert trained.demonstrations.state.shape == (1, 2, 70)
     jax.tree.map(lambda whole, part: np.testing.assert_array_equal(whole[:, 1:], part), trained, some)
     for a, b in zip(trained.demonstrations, some.demonstrations, strict=True):
@@ -258,29 +270,41 @@ def test_sources_come_back_from_disk_as_they_were(pair):
 
 
 def test_a_source_of_several_points_hands_on_what_is_trained_at_each(tmp_path):
-    two = replace(
-        SOURCE,
-        name="two",
-        x_values=(0.0, 1.0),
-        params_at=lambda x, preset: jrcjax.paper_params("source", "paper_table" if x else preset),
-        optimiser="sgd",
-    )
-    found = sources_of(two, TINY, range(2), tmp_path, lambda seconds: None)
+    sgd = (("config.optimiser", 1.0),)
+    two = replace(SOURCE, name="two", design=along("p", "env.speed.event_probability.low", (0.005, 0.05)), fixed=sgd)
+    found = sources_of(Job(two, TINY), range(2), tmp_path)
     key = jax.random.fold_in(jax.random.key(0), 1)
-    for point, params in enumerate(two.params_at(x, "paper") for x in two.x_values):
-        alone, _ = train_source(key, params, two.hparams_at(0.0), two.config(TINY))
+    for point in (0, 1):
+        alone, _ = train_source(key, *point_of(two, point))
         for held, wanted in zip(jax.tree.leaves(found), jax.tree.leaves(alone), strict=True):
             np.testing.assert_allclose(held[point, 1], wanted, rtol=1e-4, atol=1e-5)
     # The learners at a point take over the source that the sweep names for it.
-    sweep = replace(PAIR, name="crossed", learners=("dpr",), source=two, source_points=(1, 0), optimiser="sgd")
+    sweep = replace(PAIR, name="crossed", learners=("dpr",), source=two, source_points=(1, 0), fixed=sgd)
     run_sweep(sweep, TINY, tmp_path, QUIET, resume=False)
     data = store.load(tmp_path / "crossed", 2)
-    for point, x in enumerate(sweep.x_values):
+    for point in (0, 1):
         source = jax.tree.map(lambda leaf: leaf[1 - point, 1], found)  # noqa: B023
-        config = sweep.config(TINY)
-        log = train(target_key(key), sweep.params_at(x, "paper"), learner="dpr", config=config, source=source)[1]
+        params, hparams, config = point_of(sweep, point)
+        log = train(target_key(key), params, hparams, learner="dpr", config=config, source=source)[1]
         swept = data["policy_reward"].isel(algorithm=0, point=point, seed=1).values
         np.testing.assert_allclose(swept, log.policy_reward, rtol=1e-4)
+
+
+def test_points_of_several_settings_are_programs_of_their_own_and_one_result(tmp_path):
+    optimiser, rate = "config.optimiser", "hparams.learning_rate"
+    rows = ((0.0, 1e-3), (1.0, 1e-5), (0.0, 1e-4))
+    mixed = replace(
+        FIG5A, name="mixed", learners=("ddqn",), design=Design((Column(optimiser, optimiser), Column(rate, rate)), rows)
+    )
+    job = Job(mixed, TINY)
+    assert [(group.rows, group.config.optimiser) for group in job.groups] == [((0, 2), "adam"), ((1,), "sgd")]
+    data = store.load(run_sweep(mixed, TINY, tmp_path, QUIET, resume=False), 2)
+    np.testing.assert_array_equal(data[optimiser], [0, 1, 0])
+    key = jax.random.fold_in(jax.random.key(0), 1)
+    for point in range(3):
+        params, hparams, config = point_of(mixed, point)
+        log = train(key, params, hparams, learner="ddqn", config=config)[1]
+        np.testing.assert_allclose(data["reward"].isel(algorithm=0, point=point, seed=1), log.reward, rtol=1e-4)
 
 
 def test_sources_of_another_configuration_are_refused(pair):
@@ -289,11 +313,11 @@ def test_sources_of_another_configuration_are_refused(pair):
 
 
 def test_hyperparameters_of_points_are_part_of_the_configuration():
-    found = store.configuration(PAIR, TINY)
+    found = configuration(Job(PAIR, TINY))
     assert found["hparams"]["priority_exponent"] == [0.4, 0.0]
     assert found["hparams"]["discount"] == 0.99
     assert found["config"]["pretraining"] == 12
-    assert found["source"] == store.configuration(SOURCE, TINY)
+    assert found["source"] == configuration(Job(SOURCE, TINY))
 
 
 def test_a_transfer_sweep_compiles_once_for_all_blocks(tmp_path):
@@ -307,7 +331,7 @@ def test_a_transfer_sweep_compiles_once_for_all_blocks(tmp_path):
 @pytest.mark.parametrize("name", list(SWEEPS))
 def test_points_are_what_the_paper_varies(name):
     sweep = SWEEPS[name]
-    params, hparams = points_of(sweep, "paper")
+    params, hparams = Job(sweep, SIZE).points
     base = jrcjax.paper_params("source" if name == "fig5a" else "target")
     varied = {
         "fig6": {"speed.event_probability": params.speed.event_probability[:, 1]},
@@ -318,7 +342,8 @@ def test_points_are_what_the_paper_varies(name):
         "fig9": {"priority_exponent": hparams.priority_exponent / 0.4, "importance_end": hparams.importance_end},
     }.get(name, {})
     for values in varied.values():
-        np.testing.assert_allclose(values, sweep.x_values, rtol=1e-6)
+        wanted = (1.0, 0.0) if name == "fig9" else sweep.design.values(sweep.design.columns[0].name)
+        np.testing.assert_allclose(values, wanted, rtol=1e-6)
     # Nothing else differs from the paper's environment.
     derived = {"fig8": ("radar.miss_bank",)}.get(name, ())
     wanted = by_name(base)

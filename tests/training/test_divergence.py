@@ -10,8 +10,11 @@ from rich.console import Console
 
 import jrcjax
 from jrcjax import exact
+from jrcjax.config.toml import to_toml
 from jrcjax.training import divergence
-from sweeps.engine.program import Reference
+from sweeps.design import along
+from sweeps.engine.job import Job
+from sweeps.engine.reference import Reference
 from sweeps.engine.run import run_sweep
 from sweeps.results import store
 from sweeps.studies.registry import SWEEPS
@@ -56,9 +59,8 @@ def test_a_part_holds_the_episode_in_which_an_agent_diverged(tmp_path, environme
         SWEEPS["fig5a"],
         name="diverging",
         learners=("ddqn", "round_robin"),
-        x_values=(0.0, 1.0),
-        params_at=lambda x, preset: environments["short-target"],
-        hparams_at=lambda x: jrcjax.HParams(learning_rate=jnp.float32(1e20 if x else 1e-3)),
+        environment=to_toml(environments["short-target"]),
+        design=along("rate", "hparams.learning_rate", (1e-3, 1e20)),
     )
     folder = run_sweep(sweep, Size(seeds=2, episodes=2), tmp_path, Console(quiet=True), resume=False)
     first = store.load(folder, 2)["first_diverged"]
@@ -74,6 +76,8 @@ def test_the_first_episode_is_the_first_of_many():
     diverged = np.array([[[False, False, True, True], [False] * 4]])
     log = jrcjax.Log(*[np.zeros(shape)] * 6, diverged)
     nothing = exact.LongRun(np.zeros(1), np.zeros(1), np.zeros(1))
-    data = store.dataset(sweep, size, range(2), {"ddqn": log}, Reference(nothing, nothing, nothing))
+    job = Job(sweep, size)
+    job.__dict__["reference"] = Reference(nothing, nothing, nothing)
+    data = store.dataset(job, range(2), {"ddqn": log})
     assert data["first_diverged"].values.tolist() == [[[3, -1]]]
     assert "diverged" not in data

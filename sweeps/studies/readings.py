@@ -1,0 +1,105 @@
+"""The space of readings: all that the paper leaves open, with the range in which each is searched.
+
+Reading 0 is the default. Reading i > 0 is point i - 1 of a scrambled Sobol' sequence through the ranges, the same
+whatever the number of readings.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import NamedTuple
+
+import numpy as np
+
+from jrcjax.config.paths import Points, Range, parameter_at
+from jrcjax.learners.hparams import OPTIMISERS
+from jrcjax.model.params import EnvParams
+from sweeps.design import in_range, sobol
+from sweeps.preset import SOURCES, base_of
+
+SEED = 0
+"""Of the sequence."""
+SOURCE = "source"
+"""Name of the reading that says what source agents are trained with."""
+_SLOTS = EnvParams.max_steps_in_episode
+_SGD_STEP = 1e-2  # its steps over those of the others, whose gradients are normalised
+
+
+class Reading(NamedTuple):
+    """One question that the paper leaves open."""
+
+    path: str
+    """What answers it, see `jrcjax.config.paths`."""
+    label: str
+    """In figures and tables."""
+    where: Range | None = None
+    """The range; all of its readings, by their index, if None."""
+    scope: str = ""
+    """The learner that alone reads it, if there is one."""
+
+
+def _levels(*values: float) -> Range:
+    return Range(0.0, 0.0, levels=values)
+
+
+READINGS: tuple[Reading, ...] = (
+    Reading("hparams.learning_rate", "step size (SGD: a hundredth)", Range(1e-6, 1e-2, is_log=True)),
+    Reading("config.optimiser", "optimiser"),
+    Reading("hparams.epsilon_slots", "slots of exploration", Range(20.0 * _SLOTS, 600.0 * _SLOTS, is_log=True)),
+    Reading("env.event_model", "events"),
+    Reading("env.speed.event_probability.low", "p_0^v", _levels(0.005, 0.05)),
+    Reading("env.count_event_packets", "packets with an event count", _levels(1.0, 0.0)),
+    Reading("env.miss_convention", "miss detection on data"),
+    Reading("env.radar.distance", "distance of objects"),
+    Reading("env.radar.counting_rule", "counting rule"),
+    Reading("env.radar.count_model", "number of objects"),
+    Reading("env.all.persistence", "persistence of factors", Range(0.0, 0.95)),
+    Reading("env.terminal_time_limit", "time limit is terminal", _levels(0.0, 1.0)),
+    Reading("hparams.step_exponent", "Q-learning's exponent", Range(0.51, 1.0), "q_learning"),
+    Reading("hparams.step_constant", "Q-learning's constant step", _levels(0.0, 0.01, 0.1), "q_learning"),
+    Reading("hparams.initial_weights", "TLwD's initial weights"),
+    Reading(SOURCE, "source's hyperparameters"),
+    Reading("config.n_step", "n of returns", _levels(10.0, 1.0, 5.0, 20.0), "tlwd"),
+    Reading("hparams.margin", "margin", Range(0.1, 100.0, is_log=True), "tlwd"),
+    Reading("hparams.margin_weight", "weight of the margin", Range(0.1, 100.0, is_log=True), "tlwd"),
+    Reading("hparams.demonstration_constant", "demonstrations' priority", Range(0.001, 10.0), "tlwd"),
+    Reading("hparams.importance_start", "first beta", Range(0.0, 1.0), "tlwd"),
+)
+"""All questions, and where their answers are searched."""
+
+
+@functools.cache
+def _parameters() -> dict:
+    base: Points = base_of("target", "paper").points
+    return {reading.path: parameter_at(reading.path, base) for reading in READINGS if reading.path != SOURCE}
+
+
+def choices(reading: Reading) -> tuple[str, ...]:
+    """Names of a reading's values, if they are indices."""
+    return SOURCES if reading.path == SOURCE else _parameters()[reading.path].readings
+
+
+def range_of(reading: Reading) -> Range:
+    """Where a reading is searched."""
+    return reading.where or _levels(*(float(i) for i in range(len(choices(reading)))))
+
+
+def unit_of(number: int, first: int = 0) -> np.ndarray:
+    """Readings `first` to `first + number` in the unit cube, [number, readings]; reading 0 has NaN."""
+    cube = sobol(len(READINGS), number, SEED, skip=max(first - 1, 0))
+    return np.vstack([np.full((1, len(READINGS)), np.nan), cube[: number - 1]]) if first == 0 else cube
+
+
+def values_at(unit: np.ndarray) -> dict[str, float]:
+    """A reading's values by path from its place in the unit cube; none, so all as by default, for NaN."""
+    if np.isnan(unit).any():
+        return {}
+    found = {}
+    for reading, u in zip(READINGS, unit, strict=True):
+        parameter = _parameters().get(reading.path)
+        found[reading.path] = float(
+            in_range(np.array([u]), parameter is not None and parameter.is_whole, range_of(reading))[0]
+        )
+    if OPTIMISERS[int(found["config.optimiser"])] == "sgd":
+        found["hparams.learning_rate"] = float(f"{_SGD_STEP * found['hparams.learning_rate']:.6g}")
+    return found

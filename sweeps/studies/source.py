@@ -1,0 +1,53 @@
+"""Source agents of all sweeps of the paper: Double DQN in Table I's source environment."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from sweeps.sweep import Sweep
+
+SOURCE = Sweep(
+    name="source",
+    description="source agents and their demonstrations",
+    learners=("ddqn",),
+    environment="source",
+    hands_on=True,
+)
+
+_NOT_THE_SOURCES = frozenset(
+    {
+        "hparams.step_exponent",
+        "hparams.step_constant",
+        "hparams.priority_exponent",
+        "hparams.priority_constant",
+        "hparams.demonstration_constant",
+        "hparams.importance_start",
+        "hparams.importance_end",
+        "hparams.n_step_weight",
+        "hparams.margin_weight",
+        "hparams.l2_weight",
+        "hparams.margin",
+        "hparams.initial_weights",
+        "config.pretraining",
+    }
+)
+"""What only Q-learning or TLwD reads, so that Double DQN's source agents are the same whatever it is."""
+
+
+def source_for(sweep: Sweep) -> tuple[Sweep, tuple[int, ...]]:
+    """What trains the source agents of a sweep with the hyperparameters and settings of its points.
+
+    Returns:
+      The source's sweep, `SOURCE` where nothing differs from Table I, and the number of its point for each point.
+    """
+    names = [column.name for column in sweep.design.columns if _is_the_sources(column.path)]
+    design, points = sweep.design.distinct(names)
+    fixed = tuple((path, value) for path, value in sweep.fixed if _is_the_sources(path))
+    if not design.columns and not fixed:
+        return SOURCE, ()
+    name = f"{sweep.name}-source"
+    return replace(SOURCE, name=name, design=design, fixed=fixed, own=True, seeds_per_part=sweep.seeds_per_part), points
+
+
+def _is_the_sources(path: str) -> bool:
+    return path.startswith(("hparams.", "config.")) and path not in _NOT_THE_SOURCES
