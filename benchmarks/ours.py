@@ -75,14 +75,15 @@ def learner(name: str, agents: int, steps: int, devices: int | None = None, **se
         if name not in ("ddqn", "tlwd"):
             return new
         size, states, actions = config.replay_capacity, params.num_states, params.num_actions
-        ids = jax.random.randint(key, (4, size), 0, jnp.array([[states], [actions], [states], [1]]))
-        one_step = uniform.Transition(ids[0], ids[1], jax.random.normal(key, (size,)), ids[2], ids[3])
+        ids = jax.random.randint(key, (3, size), 0, jnp.array([[states], [actions], [states]]))
+        discount = jnp.full(size, hparams.discount)
+        one_step = uniform.Transition(ids[0], ids[1], jax.random.normal(key, (size,)), ids[2], discount)
         if name == "ddqn":
-            ring = packing.pack(one_step, uniform.layout(states, actions))
+            ring = packing.pack(one_step, uniform.layout_of(states, actions))
             return new._replace(learner=new.learner._replace(ring=ring))
         items = n_step.NStepTransition(*one_step, one_step.reward, jnp.full(size, 0.9), one_step.next_state)
-        memory = prioritised.init(items, prioritised.layout(states, actions, size, size))
-        return new._replace(learner=new.learner._replace(memory=memory))
+        replay = prioritised.init(items, prioritised.layout_of(states, actions, size, size))
+        return new._replace(learner=new.learner._replace(replay=replay))
 
     start = parallel.over_agents(agent)
     advance = parallel.over_agents(

@@ -33,27 +33,22 @@ def run(quick: bool) -> list[Result]:
     steps, trees = 1000 if quick else 5000, parallel.padded(1)
 
     def of(radix: int):
-        sum_tree.RADIX = radix
-        where = sum_tree.layout(LEAVES)
+        layout = sum_tree.layout_of(LEAVES, radix)
 
         def one(_, key):
             def step(tree, words):
-                indices, values = sum_tree.sample(tree, words, where)
-                return sum_tree.update(tree, indices, values * (0.5 + rng.uniform(words[0])), where), None
+                indices, values = sum_tree.sample(tree, words, layout)
+                return sum_tree.update(tree, indices, values * (0.5 + rng.uniform(words[0])), layout), None
 
             words = jax.random.bits(key, (steps, sum_tree.NUM_WORDS, BATCH), jnp.uint32)
-            tree = sum_tree.init(jax.random.uniform(key, (LEAVES,)) + 0.1, where)
-            return sum_tree.total(jax.lax.scan(step, tree, words)[0], where)
+            tree = sum_tree.init(jax.random.uniform(key, (LEAVES,)) + 0.1, layout)
+            return sum_tree.total(jax.lax.scan(step, tree, words)[0], layout)
 
         run = parallel.over_agents(one)
         keys = jax.random.split(jax.random.key(0), trees)
         return run.lower((), keys).compile(), keys
 
-    default = sum_tree.RADIX
-    try:
-        programs = {radix: of(radix) for radix in (4, 8, 16, 32)}
-    finally:
-        sum_tree.RADIX = default
+    programs = {radix: of(radix) for radix in (4, 8, 16, 32)}
     times: dict[int, list[float]] = {radix: [] for radix in programs}
     for _ in range(3 if quick else 7):
         for radix, (program, keys) in programs.items():

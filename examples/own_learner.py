@@ -37,15 +37,15 @@ def expected_sarsa(spec, config) -> Learner:
     def init(key, hparams, source=None):
         return Table(jnp.zeros(shape), jnp.zeros(shape))
 
-    def act(table, state, slot, words, hparams):
+    def act(table, state, step, words, hparams):
         below = jnp.cumsum(chances(table.q[state])) <= rng.uniform(words[0])
         return jnp.minimum(below.sum(), spec.num_actions - 1).astype(jnp.int32)
 
-    def update(table, transition, slot, words, hparams):
-        s, a, reward, following, terminal = transition
+    def update(table, transition, step, words, hparams):
+        s, a, reward, following, discount = transition
         visits = table.visits.at[s, a].add(1.0)
         value = (chances(table.q[following]) * table.q[following]).sum()
-        target = reward + jnp.where(terminal == 1, 0.0, hparams.discount) * value
+        target = reward + discount * value
         return Table(table.q.at[s, a].add(visits[s, a] ** -hparams.step_exponent * (target - table.q[s, a])), visits)
 
     return Learner(num_words=2, init=init, act=act, update=update, policy=lambda table: greedy_policy(table.q))

@@ -184,6 +184,7 @@ class Container:
     def __init_subclass__(cls) -> None:
         """Makes a class with field declarations a dataclass and a pytree."""
         dataclasses.dataclass(frozen=True, eq=False, kw_only=True)(cls)
+        cls.__init__.__annotations__.clear()  # it also takes plain numbers, which fields do not hold
         hints = get_type_hints(cls)
         cls._schema = {}
         for field in dataclasses.fields(cls):

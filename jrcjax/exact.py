@@ -10,6 +10,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Bool, Float, Int
 
 from jrcjax.checks import is_positive, require
 from jrcjax.model import metrics, states
@@ -20,7 +21,6 @@ from jrcjax.model.rewards import reward
 from jrcjax.policies import greedy_policy
 from jrcjax.radar.bank import mean_miss_ratio
 from jrcjax.readings import RewardState
-from jrcjax.types import Float, Int
 
 __all__ = [
     "LongRun",
@@ -46,20 +46,21 @@ __all__ = [
 class LongRun(NamedTuple):
     """Long-run means per slot of one policy, scalars."""
 
-    reward: Float
-    throughput: Float
+    reward: Float[Array, ""]
+    """Mean reward."""
+    throughput: Float[Array, ""]
     """Packets per slot."""
-    miss_detection: Float
+    miss_detection: Float[Array, ""]
     """Equation (7) in the parameters' convention; NaN if the policy never meets a slot that counts."""
 
 
-def level_transition(prior: Float, persistence: Float) -> Float:
+def level_transition(prior: Float[Array, " J"], persistence: Float[Array, ""]) -> Float[Array, "J J"]:
     """Transition matrix of one factor, [J, J]: kappa I + (1 - kappa) 1 tau^T."""
     return persistence * jnp.eye(prior.shape[0]) + (1.0 - persistence) * prior[None, :]
 
 
 @of_params
-def state_transition(params: EnvParams) -> Float:
+def state_transition(params: EnvParams) -> Float[Array, "S S"]:
     """P(s' | s), [S, S]. Factors evolve independently, so it is the Kronecker product of theirs."""
     matrix = jnp.ones((1, 1))
     for factor in params.factors:
@@ -68,14 +69,14 @@ def state_transition(params: EnvParams) -> Float:
 
 
 @of_params
-def transition_tensor(params: EnvParams) -> Float:
+def transition_tensor(params: EnvParams) -> Float[Array, "S A S"]:
     """P(s' | s, a), [S, A, S]; equation (10). Actions have no influence on the state."""
     matrix = state_transition(params)
     return jnp.broadcast_to(matrix[:, None, :], (params.num_states, params.num_actions, params.num_states))
 
 
 @of_params
-def stationary_distribution(params: EnvParams) -> Float:
+def stationary_distribution(params: EnvParams) -> Float[Array, " S"]:
     """Long-run probability of each state under every policy, [S]: the product of the priors."""
     law = jnp.ones(1)
     for factor in params.factors:
@@ -84,7 +85,7 @@ def stationary_distribution(params: EnvParams) -> Float:
 
 
 @of_params
-def packet_table(params: EnvParams) -> Float:
+def packet_table(params: EnvParams) -> Float[Array, "S A"]:
     """Packets delivered in each state by each action, [S, A]; 0 for radar."""
     channel = states.levels_of(jnp.arange(params.num_states), params.shape)[:, 0]
     rates = jnp.arange(params.num_rates)
@@ -93,16 +94,16 @@ def packet_table(params: EnvParams) -> Float:
 
 
 @of_params
-def miss_table(params: EnvParams) -> Float:
+def miss_table(params: EnvParams) -> Float[Array, " A"]:
     """E[p_k] of each action, [A]; 1 for data."""
     return jnp.concatenate([jnp.ones(params.num_rates), mean_miss_ratio(params.radar)])
 
 
-def _is_data(params: EnvParams) -> jax.Array:
+def _is_data(params: EnvParams) -> Bool[Array, " A"]:
     return jnp.arange(params.num_actions) < params.num_rates
 
 
-def _episode_mean(table: Float, params: EnvParams) -> Float:
+def _episode_mean(table: Float[Array, "S A"], params: EnvParams) -> Float[Array, "S A"]:
     """(1/T) sum over t < T of P^t table, [S, A]: the mean over the T slots of an episode.
 
     P is the product of one matrix per factor, Q + kappa (I - Q), where Q averages over the factor's prior. With
@@ -111,7 +112,7 @@ def _episode_mean(table: Float, params: EnvParams) -> Float:
     """
     slots = params.max_steps_in_episode
 
-    def mean_of(part: Float, rate: Float | None, axis: int) -> Float:
+    def mean_of(part: Array, rate: Array | None, axis: int) -> Array:
         if axis == len(params.factors):
             return part if rate is None else part * (1.0 - rate**slots) / (slots * (1.0 - rate))
         factor = params.factors[axis]
@@ -125,7 +126,7 @@ def _episode_mean(table: Float, params: EnvParams) -> Float:
 
 
 @of_params
-def as_observed(params: EnvParams, table: Float) -> Float:
+def as_observed(params: EnvParams, table: Float[Array, "S A"]) -> Float[Array, "S A"]:
     """The mean of a table [S, A] of what slots give, over the slots in which the agent observes each state; [S, A].
 
     Under `reward_state` "current" that is the table itself. Under "episode_start" a slot gives what the episode's first
@@ -137,13 +138,13 @@ def as_observed(params: EnvParams, table: Float) -> Float:
 
 
 @of_params
-def expected_reward(params: EnvParams) -> Float:
+def expected_reward(params: EnvParams) -> Float[Array, "S A"]:
     """E[rho | s, a] in the slots in which an agent observes s, [S, A]; see `as_observed`."""
     return as_observed(params, slot_reward(params))
 
 
 @of_params
-def slot_reward(params: EnvParams) -> Float:
+def slot_reward(params: EnvParams) -> Float[Array, "S A"]:
     """E[rho | s, a] of a slot whose event and packets belong to s, [S, A].
 
     Equation (11) averaged over event and placement, in both of which it is linear.
@@ -155,7 +156,7 @@ def slot_reward(params: EnvParams) -> Float:
 
 
 @of_params
-def largest_reward(params: EnvParams) -> Float:
+def largest_reward(params: EnvParams) -> Float[Array, ""]:
     """Max |rho_t| over states, actions, events and miss ratios, a scalar; equation (11) is linear in the miss ratio."""
     is_data, packets = _is_data(params)[None], packet_table(params)
     extremes = [
@@ -167,7 +168,9 @@ def largest_reward(params: EnvParams) -> Float:
 
 
 @of_params
-def value_iteration(params: EnvParams, gamma: Float | float = 0.99, tolerance: float = 1e-4) -> Float:
+def value_iteration(
+    params: EnvParams, gamma: Float[Array, ""] | float = 0.99, tolerance: float = 1e-4
+) -> Float[Array, "S A"]:
     """Q* of the discounted problem, [S, A].
 
     Under `reward_state` "episode_start" what an agent observes is no Markov state. Q* then belongs to the problem in
@@ -191,10 +194,10 @@ def value_iteration(params: EnvParams, gamma: Float | float = 0.99, tolerance: f
     gamma = jnp.asarray(gamma, jnp.float32)
     scale = gamma / (1.0 - gamma)
 
-    def backup(values: Float) -> Float:
+    def backup(values: Float[Array, " S"]) -> Float[Array, "S A"]:
         return rewards + gamma * transition @ values
 
-    def bounds(change: Float) -> tuple[Float, Float]:
+    def bounds(change: Float[Array, " S"]) -> tuple[Float[Array, ""], Float[Array, ""]]:
         return scale * change.min(), scale * change.max()
 
     def unsettled(carry):
@@ -219,18 +222,18 @@ def value_iteration(params: EnvParams, gamma: Float | float = 0.99, tolerance: f
 
 
 @of_params
-def optimal_policy(params: EnvParams, gamma: Float | float = 0.99) -> Float:
+def optimal_policy(params: EnvParams, gamma: Float[Array, ""] | float = 0.99) -> Float[Array, "S A"]:
     """The greedy policy of Q*, [S, A] with one 1 per row."""
     return greedy_policy(value_iteration(params, gamma))
 
 
-def policy_of_actions(actions: Int, num_actions: int) -> Float:
+def policy_of_actions(actions: Int[Array, "*batch S"], num_actions: int) -> Float[Array, "*batch S A"]:
     """Probabilities [..., S, A] of a deterministic policy given as actions [..., S]."""
     return jax.nn.one_hot(actions, num_actions)
 
 
 @of_params
-def best_constant_action(params: EnvParams) -> Float:
+def best_constant_action(params: EnvParams) -> Float[Array, "S A"]:
     """The policy [S, A] that takes the same action in every state and earns the most in the long run."""
     earned = stationary_distribution(params) @ expected_reward(params)
     return policy_of_actions(jnp.full(params.num_states, jnp.argmax(earned)), params.num_actions)
@@ -241,7 +244,7 @@ def _is_policy(policy: np.ndarray) -> bool:
 
 
 @of_params
-def evaluate_policy(params: EnvParams, policy: Float) -> LongRun:
+def evaluate_policy(params: EnvParams, policy: Float[Array, "S A"]) -> LongRun:
     """Long-run reward, throughput and miss detection per slot of a stationary policy.
 
     Under `reward_state` "episode_start" they are the means over the slots of many episodes: the first state of each is

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import jax
 import jax.numpy as jnp
+from jaxtyping import Array, Float
 
-from jrcjax.types import Float
 
-
-def greedy_policy(q: Float) -> Float:
+def greedy_policy(q: Float[Array, "*batch S A"]) -> Float[Array, "*batch S A"]:
     """Probabilities [..., S, A] of the policy that takes the largest value, the first of equals."""
     return jax.nn.one_hot(jnp.argmax(q, axis=-1), q.shape[-1])

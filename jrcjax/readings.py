@@ -72,3 +72,54 @@ class RewardState(Reading):
     """The one that the agent observes."""
     EPISODE_START = 1
     """The episode's first, although what the agent observes goes on changing; so in the authors' earlier code."""
+
+
+class Exploration(Reading):
+    """How epsilon falls over `HParams.epsilon_slots`."""
+
+    LINEAR = 0
+    EXPONENTIAL = 1
+    """By the same factor from episode to episode."""
+
+
+class Loss(Reading):
+    """How an error of equations (26) and (27) counts."""
+
+    SQUARED = 0
+    HUBER = 1
+    """Squared up to `HParams.huber_delta`, linear beyond it."""
+
+
+class Initialiser(Reading):
+    """Where a network's random weights come from."""
+
+    LECUN_NORMAL = 0
+    GLOROT_UNIFORM = 1
+    HE_NORMAL = 2
+
+
+class ImportanceOver(Reading):
+    """Which updates the beta of equation (24) rises over."""
+
+    ALL_UPDATES = 0
+    """Pre-training and training."""
+    TRAINING = 1
+    """Training alone; beta is `importance_start` throughout pre-training."""
+
+
+class DemonstrationRewards(Reading):
+    """What TLwD does with the rewards that the demonstrations brought in the source environment."""
+
+    SOURCE = 0
+    """It learns from them as from its own."""
+    UNUSED = 1
+    """Demonstrations count for the margin alone: they have no temporal-difference error."""
+
+
+class InitialWeights(Reading):
+    """TLwD's network at the start of pre-training."""
+
+    RANDOM = 0
+    """As in Algorithm 2."""
+    SOURCE = 1
+    """The source agent's."""

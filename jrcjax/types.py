@@ -21,8 +21,6 @@ Bool: TypeAlias = jax.Array
 Words: TypeAlias = jax.Array
 """A uint32 array of random bits."""
 
-INITIAL_WEIGHTS = ("random", "source")
-
 
 def choice(field: str, name: str, allowed: tuple[str, ...]) -> int:
     """Number of `name` among the names that are allowed.

@@ -13,6 +13,7 @@ FLOORS = (
     (
         "types",
         "checks",
+        "keys",
         "readings",
         "containers",
         "named",
@@ -118,7 +119,7 @@ def test_learners_do_not_know_the_environment(path):
 
 @pytest.mark.parametrize("path", LIBRARY, ids=module_of)
 def test_the_library_needs_neither_its_users_nor_other_frameworks(path):
-    forbidden = {"sweeps", "paper_figs", "benchmarks", "torch"}
+    forbidden = {"sweeps", "paper_figs", "explorer", "benchmarks", "torch"}
     if "adapters" not in module_of(path):  # whose purpose is to look like gymnasium
         forbidden |= {"gymnax", "gymnasium"}
     if module_of(path) != "jrcjax.render":  # which draws

@@ -59,7 +59,7 @@ def _setup(agents: int, steps: int, method: Any) -> Ready:
     def one_step(agent: Agent, _):
         key, act_key, explore_key, env_key, sample_key = jax.random.split(agent.key, 5)
         greedy = jnp.argmax(network.apply(agent.params, agent.obs))
-        explores = jax.random.uniform(explore_key) < epsilon(agent.step, hparams)
+        explores = jax.random.uniform(explore_key) < epsilon(agent.step, hparams, params.max_steps_in_episode)
         action = jnp.where(explores, jax.random.randint(act_key, (), 0, env.num_actions), greedy)
         next_obs, state, reward, terminated, _, info = env.step(env_key, agent.env, action, params)
         item = {
@@ -105,7 +105,7 @@ def _uniform(network, optimiser, hparams, config):
     import jax.numpy as jnp
     import optax
 
-    from jrcjax.learners.value_learning import double_q_value, squared_td_loss, td_target
+    from jrcjax.learners.value_learning import double_q_value, td_target
 
     sizes = (config.replay_capacity, 1, config.batch_size)
     buffer = fbx.make_item_buffer(*sizes)
@@ -123,8 +123,8 @@ def _uniform(network, optimiser, hparams, config):
         def loss(weights):
             chosen = jnp.take_along_axis(network.apply(weights, batch["obs"]), batch["action"][:, None], 1)[:, 0]
             online = network.apply(jax.lax.stop_gradient(weights), batch["next_obs"])
-            value = double_q_value(online, network.apply(agent.target, batch["next_obs"]))
-            return squared_td_loss(td_target(batch["reward"], batch["discount"], value) - chosen)
+            value = jax.vmap(double_q_value)(online, network.apply(agent.target, batch["next_obs"]))
+            return jnp.mean(jnp.square(td_target(batch["reward"], batch["discount"], value) - chosen))
 
         updates, state = optimiser.update(jax.grad(loss)(agent.params), agent.optimiser)
         return agent._replace(params=optax.apply_updates(agent.params, updates), optimiser=state, memory=memory)
@@ -144,7 +144,7 @@ def _prioritised(network, optimiser, hparams, config):
     exponent = float(hparams.priority_exponent)
     buffer = fbx.make_prioritised_item_buffer(*sizes, priority_exponent=exponent)
     of_sequences = fbx.make_prioritised_item_buffer(*sizes, add_sequences=True, priority_exponent=exponent)
-    n = config.n_step
+    n, of_demonstration = config.n_step, jax.vmap(large_margin_loss, in_axes=(0, 0, None))
 
     def fill(key):
         """A full memory, and the last n transitions, whose returns are still growing."""
@@ -180,11 +180,12 @@ def _prioritised(network, optimiser, hparams, config):
             q = network.apply(params, batch["obs"])
             chosen = jnp.take_along_axis(q, batch["action"][:, None], 1)[:, 0]
             online = network.apply(jax.lax.stop_gradient(params), batch["next_obs"])
-            value = double_q_value(online, network.apply(agent.target, batch["next_obs"]))
+            value = jax.vmap(double_q_value)(online, network.apply(agent.target, batch["next_obs"]))
             td_error = td_target(batch["reward"], batch["discount"], value) - chosen
             n_value = network.apply(agent.target, batch["n_obs"]).max(axis=-1)
             n_error = td_target(batch["n_return"], batch["n_discount"], n_value) - chosen
-            margin = jnp.where(batch["is_demonstration"], large_margin_loss(q, batch["action"], hparams.margin), 0.0)
+            is_expert = jax.nn.one_hot(batch["action"], q.shape[1], dtype=bool)
+            margin = jnp.where(batch["is_demonstration"], of_demonstration(q, is_expert, hparams.margin), 0.0)
             total = td_error**2 + hparams.n_step_weight * n_error**2 + hparams.margin_weight * margin
             return jnp.mean(weights * total) + hparams.l2_weight * l2_loss(params), td_error
 

@@ -20,6 +20,7 @@ from jrcjax.agents import layout
 from jrcjax.agents.saved_agent import SavedAgent
 from jrcjax.checks import refuse, require, require_type
 from jrcjax.files import DamagedFile, write_whole
+from jrcjax.keys import key_of
 from jrcjax.learners import Spec
 from jrcjax.learners.hparams import Config, HParams, check_hparams
 from jrcjax.learners.q_function import q_function
@@ -172,7 +173,7 @@ def _check_values(learner: str, values: dict[str, Any], spec: Spec, config: Conf
     if learner == "q_learning":
         wanted: Any = {"q": jax.ShapeDtypeStruct((states.num_states(spec.shape), spec.num_actions), jnp.float32)}
     else:
-        wanted = {"weights": jax.eval_shape(q_function(spec, config).init, jax.random.key(0))}
+        wanted = {"weights": jax.eval_shape(q_function(spec, config).init, key_of(0))}
     shapes = {name: (*leading, *leaf.shape) for name, leaf in named_arrays(wanted).items()}
     found = {name: tuple(leaf.shape) for name, leaf in named_arrays(values).items()}
     if found != shapes:

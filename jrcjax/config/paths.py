@@ -16,10 +16,9 @@ import numpy as np
 
 from jrcjax.checks import refuse
 from jrcjax.containers import Container, Kind, schema_of
-from jrcjax.learners.hparams import FORMS, OPTIMISERS, Config, HParams
+from jrcjax.learners.hparams import CLIPPINGS, FORMS, OPTIMISERS, TARGET_UPDATES, Config, HParams
 from jrcjax.model.params import FACTORS, EnvParams
 from jrcjax.named import field_at
-from jrcjax.types import INITIAL_WEIGHTS
 
 
 class Points(NamedTuple):
@@ -30,11 +29,15 @@ class Points(NamedTuple):
 
 
 _ROOTS = {"env": "params", "hparams": "hparams", "config": "config"}
-_READINGS = {"initial_weights": INITIAL_WEIGHTS}
 DISTRIBUTIONS = ("prior", "class_share")
 """Fields whose entries sum to 1."""
 _LOW_AND_HIGH = ("prior", "event_probability", "interference", "packets", "sinr_threshold")
-_STATIC_READINGS = {"optimiser": OPTIMISERS, "form": FORMS}
+_STATIC_READINGS = {
+    "optimiser": OPTIMISERS,
+    "form": FORMS,
+    "target_update": TARGET_UPDATES,
+    "gradient_clipping": CLIPPINGS,
+}
 _SHARED = ("episodes", "demonstrations")  # dimensions of results, the same at all points
 _MOST_VALUES = 1000
 
@@ -206,17 +209,12 @@ def _entry(path: str, parts: list[str], container: Any) -> Entry:
 
 def _fields_of(container: Any) -> list[str]:
     """The fields that may differ between the points of one program."""
-    if isinstance(container, Container):
-        fields = [name for name, f in schema_of(container).items() if f.kind not in (Kind.SETTING, Kind.DERIVED)]
-    else:
-        fields = [f.name for f in dataclasses.fields(container) if f.metadata.get("pytree_node", True)]
+    fields = [name for name, f in schema_of(container).items() if f.kind not in (Kind.SETTING, Kind.DERIVED)]
     return fields + (["all"] if "channel" in fields else [])
 
 
 def _readings_of(container: Any, fields: tuple[str, ...]) -> tuple[str, ...]:
-    if isinstance(container, Container):
-        return field_at(type(container), ".".join(fields)).names
-    return _READINGS.get(fields[-1], ())
+    return field_at(type(container), ".".join(fields)).names
 
 
 def _refuse_static(path: str, parts: list[str], container: Any) -> None:

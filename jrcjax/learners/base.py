@@ -35,23 +35,23 @@ class Source(NamedTuple):
 
 
 class Learner(NamedTuple):
-    """One agent's learning rule. `slot` counts slots from 0 and is the same for all agents of a batch."""
+    """One agent's learning rule. `step` counts slots from 0 and is the same for all agents of a batch."""
 
     num_words: int
-    """Random words per slot, split between `act` (the first two) and `update`."""
+    """Random words per step, split between `act` (the first two) and `update`."""
     init: Callable[[Key, HParams, Source | None], State]
-    """(key, hparams, source) to the learner state before the first slot; pre-training is done here."""
+    """(key, hparams, source) to the learner state before the first step; pre-training is done here."""
     act: Callable[[State, Int, Int, Words, HParams], Int]
-    """(learner state, state id, slot, words, hparams) to an action."""
+    """(learner state, state id, step, words, hparams) to an action."""
     update: Callable[[State, Transition, Int, Any, HParams], State]
-    """(learner state, transition, slot, what `draw` made of the slot's words, hparams) to the next learner state."""
+    """(learner state, transition, step, what `draw` made of the step's words, hparams) to the next learner state."""
     policy: Callable[[State], Float]
     """Learner state to the policy without exploration, [S, A] probabilities."""
     values: Callable[[State], Float] | None = None
     """Learner state to Q(s, a), [S, A], by which divergence is noticed; None for learners without values."""
-    draw: Callable[[Words, Int], Any] = lambda words, slots: words
-    """(words of `update` [slots, words], numbers of the slots [slots]) to what `update` is given per slot; leaves have
-    a leading axis of slots. What needs nothing but words costs less for a whole episode at once."""
+    draw: Callable[[Words, Int], Any] = lambda words, steps: words
+    """(words of `update` [steps, words], numbers of the steps [steps]) to what `update` is given per step; leaves have
+    a leading axis of steps. What needs nothing but words costs less for a whole episode at once."""
     needs_source: bool = False
     """Whether `init` needs a source."""
 

@@ -6,92 +6,111 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-import optax
 
 from jrcjax.learners import exploration
 from jrcjax.learners.base import Learner, Source, Spec
-from jrcjax.learners.hparams import Config, HParams, optimiser_of
-from jrcjax.learners.q_function import QFunction, copied_if, q_function
+from jrcjax.learners.hparams import Config, HParams
+from jrcjax.learners.optimiser import Optimiser, check_optimiser, optimiser_of
+from jrcjax.learners.q_function import QFunction, q_function
 from jrcjax.learners.schedules import epsilon
-from jrcjax.learners.value_learning import squared_td_loss, td_target
+from jrcjax.learners.value_learning import td_loss, td_target
 from jrcjax.model import states
 from jrcjax.policies import greedy_policy
-from jrcjax.replay import uniform
+from jrcjax.replay import packing, uniform
 from jrcjax.replay.uniform import Transition
-from jrcjax.types import Float, Int, Words
+from jrcjax.types import Float, Int, Key, Words
 
 
 class DDQNState(NamedTuple):
-    """One agent's networks, optimiser and memory."""
+    """One agent's networks, optimiser and replay memory."""
 
     weights: Any
     """theta."""
     target: Any
-    """theta' as its table [A, S], or as weights in the mini-batch form."""
+    """theta', as `QFunction.target_of` keeps it."""
     optimiser: Any
     ring: Words
     """[capacity, words] replay memory."""
 
 
-def ddqn_loss(function: QFunction, weights: Any, target: Any, batch: Transition, discount: Float) -> Float:
-    """Equation (16) for a batch [B]."""
+class DDQN(NamedTuple):
+    """Algorithm 1 for one problem; its methods work on the state of one agent."""
+
+    spec: Spec
+    config: Config
+    function: QFunction
+    optimiser: Optimiser
+    layout: packing.Layout
+
+    def init(self, key: Key, hparams: HParams, source: Source | None = None) -> DDQNState:
+        """A random network, and nothing in the replay memory."""
+        return self.start(self.function.init(key, hparams.initialiser))
+
+    def start(self, weights: Any) -> DDQNState:
+        """An agent with this network."""
+        # Algorithm 1 starts both networks at random; equal weights spare the first period an arbitrary target.
+        target, ring = self.function.target_of(weights), uniform.init(self.config.replay_capacity, self.layout)
+        return DDQNState(weights, target, self.optimiser.init(weights), ring)
+
+    def act(self, state: DDQNState, state_id: Int, step: Int, words: Words, hparams: HParams) -> Int:
+        """Line 9."""
+        random = epsilon(step, hparams, self.spec.episode_slots)
+        return exploration.epsilon_greedy(words, self.function.of_state(state.weights, state_id), random)
+
+    def draw(self, words: Words, steps: Int) -> Int:
+        """Where the mini-batches of these steps lie, [steps, B]."""
+        return uniform.draw(words, steps[:, None] + 1, self.config.replay_capacity)
+
+    def update(
+        self, state: DDQNState, transition: Transition, step: Int, positions: Int, hparams: HParams
+    ) -> DDQNState:
+        """Lines 12 to 18: stores a transition and learns from a mini-batch, whose positions [B] are drawn."""
+        ring = uniform.add(state.ring, transition, step, self.layout)
+        batch = uniform.at(ring, positions, self.layout, hparams.discount)
+        target = self.function.next_target(state.target, state.weights, step, hparams)
+        gradient = jax.grad(ddqn_loss, argnums=1)(self.function, state.weights, target, batch, hparams)
+        weights, optimiser = self.optimiser.step(gradient, state.optimiser, state.weights, hparams)
+        return DDQNState(weights, target, optimiser, ring)
+
+    def values(self, state: DDQNState) -> Float:
+        """Q(s, a), [S, A]."""
+        return self.function.table(state.weights)
+
+
+def ddqn_loss(function: QFunction, weights: Any, target: Any, batch: Transition, hparams: HParams) -> Float:
+    """Equations (16) and (20): the mean over a mini-batch [B]."""
     next_value = function.double_q(weights, target, batch.next_state)
-    y = td_target(batch.reward, jnp.where(batch.terminal == 1, 0.0, discount), next_value)
-    return squared_td_loss(y - function.chosen(weights, batch.state, batch.action))
+    y = td_target(batch.reward, batch.discount, next_value)
+    error = y - function.chosen(weights, batch.state, batch.action)
+    return jnp.mean(td_loss(error, hparams.loss, hparams.huber_delta))
+
+
+def _of(spec: Spec, config: Config) -> DDQN:
+    function = q_function(spec, config)
+    check_optimiser(config, function)
+    layout = uniform.layout_of(states.num_states(spec.shape), spec.num_actions)
+    return DDQN(spec, config, function, optimiser_of(config), layout)
 
 
 def ddqn(spec: Spec, config: Config) -> Learner:
     """Double DQN with uniform replay."""
-    function = q_function(spec, config)
-    optimiser = optimiser_of(config)
-    where = uniform.layout(states.num_states(spec.shape), spec.num_actions)
-
-    def init(key, hparams: HParams, source: Source | None = None) -> DDQNState:
-        weights = function.init(key)
-        ring = uniform.init(config.replay_capacity, where)
-        # Algorithm 1 starts both networks at random; equal weights spare the first period an arbitrary target.
-        return DDQNState(weights, function.target_of(weights), optimiser.init(weights), ring)
-
-    def act(state: DDQNState, state_id, slot, words, hparams: HParams) -> Int:
-        return exploration.epsilon_greedy(words, function.of_state(state.weights, state_id), epsilon(slot, hparams))
-
-    def draw(words: Words, slots: Int) -> Int:
-        return uniform.draw(words, slots[:, None] + 1, config.replay_capacity)
-
-    def update(state: DDQNState, transition: Transition, slot, positions: Int, hparams: HParams) -> DDQNState:
-        ring = uniform.add(state.ring, transition, slot, where)
-        batch = uniform.at(ring, positions, where)
-        # After every target_period updates theta' <- theta. Done at the start of the slot that follows, whose table
-        # is needed anyway.
-        due = slot % hparams.target_period == 0
-        target = copied_if(due, function.target_of(state.weights), state.target)
-        gradient = jax.grad(ddqn_loss, argnums=1)(function, state.weights, target, batch, hparams.discount)
-        step, optimiser_state = optimiser.step(gradient, state.optimiser, state.weights, hparams)
-        return DDQNState(optax.apply_updates(state.weights, step), target, optimiser_state, ring)
-
+    rule = _of(spec, config)
     return Learner(
         num_words=exploration.NUM_WORDS + config.batch_size,
-        init=init,
-        act=act,
-        update=update,
-        policy=lambda state: greedy_policy(function.table(state.weights)),
-        values=lambda state: function.table(state.weights),
-        draw=draw,
+        init=rule.init,
+        act=rule.act,
+        update=rule.update,
+        policy=lambda state: greedy_policy(rule.values(state)),
+        values=rule.values,
+        draw=rule.draw,
     )
 
 
 def dpr(spec: Spec, config: Config) -> Learner:
     """Direct policy reuse (section VI-A.4): Double DQN that goes on from the source agent's weights."""
-    from_scratch = ddqn(spec, config)
-    function = q_function(spec, config)
 
-    def init(key, hparams: HParams, source: Source | None = None) -> DDQNState:
+    def init(key: Key, hparams: HParams, source: Source | None = None) -> DDQNState:
         assert source is not None
-        state = from_scratch.init(key, hparams, None)
-        return state._replace(
-            weights=source.weights,
-            target=function.target_of(source.weights),
-            optimiser=optimiser_of(config).init(source.weights),
-        )
+        return _of(spec, config).start(source.weights)
 
-    return from_scratch._replace(init=init, needs_source=True)
+    return ddqn(spec, config)._replace(init=init, needs_source=True)

@@ -25,10 +25,10 @@ def _explored(state: FixedState) -> Float:
 FIXED = Learner(
     num_words=exploration.NUM_WORDS,
     init=lambda key, hparams, source=None: None,  # the policy comes from elsewhere
-    act=lambda state, state_id, slot, words, hparams: exploration.epsilon_greedy(
+    act=lambda state, state_id, step, words, hparams: exploration.epsilon_greedy(
         words, state.policy[state_id], state.epsilon
     ),
-    update=lambda state, transition, slot, words, hparams: state,
+    update=lambda state, transition, step, words, hparams: state,
     policy=_explored,
 )
 """The rule whose state is a `FixedState`; its policy counts the exploration."""

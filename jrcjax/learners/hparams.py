@@ -2,75 +2,95 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 import optax
-from flax import struct
+from jaxtyping import Array, Float, Int
 
-from jrcjax.checks import is_not_negative, refuse, replaced, require, require_integer, require_reading, require_type
-from jrcjax.types import INITIAL_WEIGHTS, Float, Int
+from jrcjax.checks import is_traced, refuse, require_integer, require_type
+from jrcjax.containers import (
+    BELOW_ONE,
+    NOT_NEGATIVE,
+    POSITIVE,
+    PROBABILITY,
+    Allowed,
+    Container,
+    integer,
+    number,
+    reading,
+)
+from jrcjax.readings import DemonstrationRewards, Exploration, ImportanceOver, Initialiser, InitialWeights, Loss
 
 OPTIMISERS = ("adam", "sgd", "rmsprop")
 FORMS = ("auto", "table", "rows")
+CLIPPINGS = ("none", "global_norm")
+TARGET_UPDATES = ("copied", "soft")
 _MAX_TABLE_STATES = 256  # beyond it three rows per sample of a mini-batch cost less than all states
+_SHARE = Allowed(lambda x: (x > 0) & (x <= 1), "in (0, 1]")
+_EXPONENT = Allowed(lambda x: (x > 0.5) & (x <= 1), "in (0.5, 1], equation (14)")
+_PRIORITY = Allowed(lambda x: x >= 1e-30, ">= 1e-30")  # powers of less, and their sums, vanish
+_AT_LEAST_ONE = Allowed(lambda x: (x >= 1) & (x < 2**31), ">= 1")
 
 
-def _f32(value: float):
-    return struct.field(default_factory=lambda: jnp.float32(value))
-
-
-@struct.dataclass
-class HParams:
+class HParams(Container):
     """Numbers of the learners, all scalars; defaults are Table I, or the first reading where it is silent."""
 
-    discount: Float = _f32(0.99)
+    discount: Float[Array, ""] = number(BELOW_ONE, default=0.99)
     """gamma, in [0, 1)."""
-    epsilon_start: Float = _f32(1.0)
+    epsilon_start: Float[Array, ""] = number(PROBABILITY, default=1.0)
     """Probability of a random action at first."""
-    epsilon_end: Float = _f32(0.01)
+    epsilon_end: Float[Array, ""] = number(PROBABILITY, default=0.01)
     """Probability of a random action after `epsilon_slots`."""
-    epsilon_slots: Float = _f32(30_000.0)
-    """Slots over which epsilon falls linearly: 100 episodes of 300 slots."""
-    learning_rate: Float = _f32(1e-3)
+    epsilon_slots: Float[Array, ""] = number(POSITIVE, "slots", default=30_000.0)
+    """Slots over which epsilon falls: 100 episodes of 300 slots."""
+    exploration: Int[Array, ""] = reading(Exploration)
+    """How epsilon falls: linearly from slot to slot, or by the same factor from episode to episode."""
+    learning_rate: Float[Array, ""] = number(POSITIVE, default=1e-3)
     """nu of equation (21), for the named optimisers."""
-    target_period: Int = struct.field(default_factory=lambda: jnp.int32(300))
+    initialiser: Int[Array, ""] = reading(Initialiser)
+    """Where random weights of a network come from: LeCun's normal, Glorot's uniform or He's normal distribution."""
+    loss: Int[Array, ""] = reading(Loss)
+    """How temporal-difference errors count: squared, or squared up to `huber_delta` and linear beyond it."""
+    huber_delta: Float[Array, ""] = number(POSITIVE, default=1.0)
+    """The error from which the Huber loss is linear, if `loss` says so."""
+    max_gradient_norm: Float[Array, ""] = number(POSITIVE, default=10.0)
+    """The norm that gradients are cut to, if `Config.gradient_clipping` says so."""
+    target_period: Int[Array, ""] = integer(_AT_LEAST_ONE, default=300)
     """upsilon, updates between two copies into the target network."""
-    step_exponent: Float = _f32(0.7)
+    target_rate: Float[Array, ""] = number(_SHARE, default=1e-3)
+    """tau, the share of the network that enters the target network in every update, if `Config.target_update` is
+    "soft"."""
+    step_exponent: Float[Array, ""] = number(_EXPONENT, default=0.7)
     """Q-learning's step size is n(s, a)^-exponent; in (0.5, 1] it satisfies equation (14)."""
-    step_constant: Float = _f32(0.0)
+    step_constant: Float[Array, ""] = number(PROBABILITY, default=0.0)
     """If positive, Q-learning's step size instead of the count-based one."""
-    priority_exponent: Float = _f32(0.4)
+    priority_exponent: Float[Array, ""] = number(PROBABILITY, default=0.4)
     """alpha of equation (23); 0 samples uniformly."""
-    priority_constant: Float = _f32(0.001)
-    """epsilon, added to |TD error|."""
-    demonstration_constant: Float = _f32(1.0)
-    """The same for demonstrations."""
-    importance_start: Float = _f32(0.6)
+    priority_constant: Float[Array, ""] = number(_PRIORITY, default=0.001)
+    """epsilon, added to the size of the temporal-difference error in a priority."""
+    demonstration_constant: Float[Array, ""] = number(NOT_NEGATIVE, default=1.0)
+    """What a demonstration's priority gets instead of `priority_constant`, if it is larger."""
+    demonstration_rewards: Int[Array, ""] = reading(DemonstrationRewards)
+    """Whether TLwD learns from the rewards of demonstrations, or uses these for the margin alone."""
+    importance_start: Float[Array, ""] = number(PROBABILITY, default=0.6)
     """beta of equation (24) at first."""
-    importance_end: Float = _f32(1.0)
-    """beta in the last update; linear in between, over pre-training and training together."""
-    n_step_weight: Float = _f32(1.0)
-    """lambda_1 of equation (25)."""
-    margin_weight: Float = _f32(1.0)
-    """lambda_2."""
-    l2_weight: Float = _f32(1e-5)
-    """lambda_3."""
-    margin: Float = _f32(1.0)
+    importance_end: Float[Array, ""] = number(PROBABILITY, default=1.0)
+    """beta in the last update; linear in between."""
+    importance_over: Int[Array, ""] = reading(ImportanceOver)
+    """Whether beta rises over pre-training and training together, or over training alone."""
+    n_step_weight: Float[Array, ""] = number(NOT_NEGATIVE, default=1.0)
+    """lambda_1 of equation (25), the weight of the n-step loss."""
+    margin_weight: Float[Array, ""] = number(NOT_NEGATIVE, default=1.0)
+    """lambda_2 of equation (25), the weight of the large-margin loss."""
+    l2_weight: Float[Array, ""] = number(NOT_NEGATIVE, default=1e-5)
+    """lambda_3 of equation (25), the weight of the squares of all network weights."""
+    margin: Float[Array, ""] = number(NOT_NEGATIVE, default=1.0)
     """Gamma of equation (29) for actions other than the demonstrator's."""
-    demonstration_epsilon: Float = _f32(0.01)
+    demonstration_epsilon: Float[Array, ""] = number(PROBABILITY, default=0.01)
     """Probability of a random action while the source agent demonstrates."""
-    initial_weights: Int = struct.field(default_factory=lambda: jnp.int32(0))
-    """TLwD's at the start of pre-training, index into INITIAL_WEIGHTS: random, as in Algorithm 2, or the source
-    agent's."""
-
-
-# After the class, because flax's decorator sets a `replace` of its own.
-HParams.replace = replaced  # pyright: ignore[reportAttributeAccessIssue]
+    initial_weights: Int[Array, ""] = reading(InitialWeights)
+    """TLwD's network at the start of pre-training: random, as in Algorithm 2, or the source agent's."""
 
 
 @dataclass(frozen=True)
@@ -93,6 +113,11 @@ class Config:
     """Widths of the hidden layers."""
     optimiser: str | optax.GradientTransformation = "adam"
     """One of OPTIMISERS, scaled by `HParams.learning_rate`, or any optax optimiser, which brings its own rate."""
+    gradient_clipping: str = "none"
+    """Whether gradients are cut: "none", or "global_norm" to `HParams.max_gradient_norm` over all weights together."""
+    target_update: str = "copied"
+    """How the target network follows: "copied" every `HParams.target_period` updates, or "soft" in every update, by the
+    share `HParams.target_rate`. A soft target keeps its weights instead of its table, and an update costs more."""
     form: str = "auto"
     """How the loss is computed: "table" evaluates the network on all states and indexes the result, "rows" on the
     samples of the mini-batch; "auto" takes the table up to 256 states. Both give the same gradient."""
@@ -102,28 +127,6 @@ class Config:
         return self.form == "table" or (self.form == "auto" and num_states <= _MAX_TABLE_STATES)
 
 
-class Optimiser(NamedTuple):
-    """An optax optimiser whose learning rate may be traced."""
-
-    init: Callable[[Any], Any]
-    step: Callable[[Any, Any, Any, HParams], tuple[Any, Any]]
-    """(gradient, state, weights, hparams) to what is added to the weights, and the next state."""
-
-
-def optimiser_of(config: Config) -> Optimiser:
-    """The optimiser of `config`; a named one takes its rate from `HParams`, equation (21)."""
-    named = {"adam": optax.scale_by_adam, "sgd": optax.identity, "rmsprop": optax.scale_by_rms}
-    optimiser = named[config.optimiser]() if isinstance(config.optimiser, str) else config.optimiser
-
-    def step(gradient: Any, state: Any, weights: Any, hparams: HParams) -> tuple[Any, Any]:
-        direction, state = optimiser.update(gradient, state, weights)
-        if not isinstance(config.optimiser, str):
-            return direction, state
-        return jax.tree.map(lambda d: -hparams.learning_rate * d, direction), state
-
-    return Optimiser(optimiser.init, step)
-
-
 def check_hparams(hparams: HParams) -> None:
     """Checks hyperparameters.
 
@@ -131,24 +134,18 @@ def check_hparams(hparams: HParams) -> None:
       ValueError: naming the field, the value and what is allowed.
     """
     require_type("hparams", hparams, HParams)
-    unit = lambda x: (x >= 0) & (x <= 1)  # noqa: E731
-    require("hparams.discount", hparams.discount, (), lambda x: (x >= 0) & (x < 1), "a number in [0, 1)")
-    require("hparams.epsilon_start", hparams.epsilon_start, (), unit, "a probability in [0, 1]")
-    require("hparams.epsilon_end", hparams.epsilon_end, (), unit, "a probability in [0, 1]")
-    require("hparams.epsilon_slots", hparams.epsilon_slots, (), lambda x: x > 0, "a number of slots > 0")
-    require("hparams.learning_rate", hparams.learning_rate, (), lambda x: x > 0, "a number > 0")
-    period = lambda x: (x >= 1) & (x == np.floor(x))  # noqa: E731
-    require("hparams.target_period", hparams.target_period, (), period, "an integer >= 1")
-    exponent = lambda x: (x > 0.5) & (x <= 1)  # noqa: E731
-    require("hparams.step_exponent", hparams.step_exponent, (), exponent, "a number in (0.5, 1], equation (14)")
-    require("hparams.step_constant", hparams.step_constant, (), unit, "a number in [0, 1], 0 for count-based steps")
-    for name in ("priority_exponent", "importance_start", "importance_end", "demonstration_epsilon"):
-        require(f"hparams.{name}", getattr(hparams, name), (), unit, "a number in [0, 1]")
-    for name in ("priority_constant", "demonstration_constant"):
-        require(f"hparams.{name}", getattr(hparams, name), (), lambda x: x >= 1e-30, "a number >= 1e-30")
-    for name in ("n_step_weight", "margin_weight", "l2_weight", "margin"):
-        require(f"hparams.{name}", getattr(hparams, name), (), is_not_negative, "a number >= 0")
-    require_reading("hparams.initial_weights", hparams.initial_weights, INITIAL_WEIGHTS)
+    hparams.check("hparams")
+    _check_exponential(hparams)
+
+
+def _check_exponential(hparams: HParams) -> None:
+    """A factor leads from one probability to another only if neither is 0."""
+    if is_traced(hparams.exploration) or int(np.asarray(hparams.exploration)) != Exploration.EXPONENTIAL:
+        return
+    for name in ("epsilon_start", "epsilon_end"):
+        value = getattr(hparams, name)
+        if not is_traced(value) and float(np.asarray(value)) == 0:
+            refuse(f"hparams.{name}", 0.0, "a probability > 0, where epsilon falls exponentially")
 
 
 def check_config(config: Config) -> None:
@@ -164,10 +161,11 @@ def check_config(config: Config) -> None:
         refuse("config.hidden", repr(config.hidden), "a tuple of Python ints >= 1")
     for width in config.hidden:
         require_integer("config.hidden", width, 1)
+    for name, choices in {"gradient_clipping": CLIPPINGS, "target_update": TARGET_UPDATES, "form": FORMS}.items():
+        value = getattr(config, name)
+        if not isinstance(value, str) or value not in choices:
+            refuse(f"config.{name}", str(value), ", ".join(map(repr, choices)))
     named = isinstance(config.optimiser, str) and config.optimiser in OPTIMISERS
     if not named and not isinstance(config.optimiser, optax.GradientTransformation):
-        refuse(
-            "config.optimiser", str(config.optimiser), f"{', '.join(map(repr, OPTIMISERS))}, or an optax transformation"
-        )
-    if not isinstance(config.form, str) or config.form not in FORMS:
-        refuse("config.form", str(config.form), ", ".join(map(repr, FORMS)))
+        allowed = f"{', '.join(map(repr, OPTIMISERS))}, or an optax transformation"
+        refuse("config.optimiser", str(config.optimiser), allowed)

@@ -8,13 +8,14 @@ are the same up to rounding. `benchmarks/README.md` has the gains.
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 from flax import linen as nn
 
-from jrcjax.types import Float
+from jrcjax.types import Float, Int
 
 _SHORT = 8  # sums of at most so many products are added up in one loop, which XLA joins with what surrounds it
 
@@ -61,16 +62,35 @@ def _dense_backward(relu: bool, saved: tuple[Float, Float, Float], gradient: Flo
 dense.defvjp(_dense_forward, _dense_backward)
 
 
+_AXES = {"in_axis": 1, "out_axis": 0}  # of a kernel [out, in]
+_INITIALISERS = (
+    nn.initializers.lecun_normal(**_AXES),
+    nn.initializers.glorot_uniform(**_AXES),
+    nn.initializers.he_normal(**_AXES),
+)  # in the order of jrcjax.readings.Initialiser
+
+
+def kernel_initialiser(choice: Int | int) -> Callable:
+    """The initialiser of kernels [out, in] of that number in `Initialiser`; it may be traced."""
+
+    def init(key, shape, dtype=jnp.float32):
+        branches = [functools.partial(each, shape=shape, dtype=dtype) for each in _INITIALISERS]
+        return jax.lax.switch(choice, branches, key)
+
+    return init
+
+
 class ColumnDense(nn.Module):
     """A layer of `dense`."""
 
     features: int
     relu: bool
+    kernel_init: Callable
 
     @nn.compact
     def __call__(self, x: Float) -> Float:
         """[in, S] to [features, S]."""
-        kernel = self.param("kernel", nn.initializers.lecun_normal(1, 0), (self.features, x.shape[0]))
+        kernel = self.param("kernel", self.kernel_init, (self.features, x.shape[0]))
         bias = self.param("bias", nn.initializers.zeros, (self.features,))
         return dense(kernel, bias, x, self.relu)
 
@@ -80,11 +100,12 @@ class QNetwork(nn.Module):
 
     num_actions: int
     hidden: tuple[int, ...]
+    kernel_init: Callable = _INITIALISERS[0]
 
     @nn.compact
     def __call__(self, features: Float) -> Float:
         """[F, S] to [A, S]."""
         x = features
         for width in self.hidden:
-            x = ColumnDense(width, relu=True)(x)
-        return ColumnDense(self.num_actions, relu=False)(x)
+            x = ColumnDense(width, True, self.kernel_init)(x)
+        return ColumnDense(self.num_actions, False, self.kernel_init)(x)

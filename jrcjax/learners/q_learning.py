@@ -34,17 +34,16 @@ def q_learning(spec: Spec, config: Config) -> Learner:
     def init(key, hparams: HParams, source=None) -> QState:
         return QState(jnp.zeros(shape), jnp.zeros(shape, jnp.int32))
 
-    def act(state: QState, state_id, slot, words, hparams: HParams):
-        return exploration.epsilon_greedy(words, state.q[state_id], epsilon(slot, hparams))
+    def act(state: QState, state_id, step, words, hparams: HParams):
+        return exploration.epsilon_greedy(words, state.q[state_id], epsilon(step, hparams, spec.episode_slots))
 
-    def update(state: QState, transition: Transition, slot, words, hparams: HParams) -> QState:
-        s, a, reward, next_state, terminal = transition
+    def update(state: QState, transition: Transition, step, words, hparams: HParams) -> QState:
+        s, a, reward, next_state, discount = transition
         visits = state.visits.at[s, a].add(1)
         counted = robbins_monro_step(visits[s, a], hparams.step_exponent)
-        step = jnp.where(hparams.step_constant > 0, hparams.step_constant, counted)
-        discount = jnp.where(terminal == 1, 0.0, hparams.discount)
+        size = jnp.where(hparams.step_constant > 0, hparams.step_constant, counted)
         error = q_learning_error(state.q, s, a, reward, next_state, discount)
-        return QState(state.q.at[s, a].add(step * error), visits)
+        return QState(state.q.at[s, a].add(size * error), visits)
 
     return Learner(
         exploration.NUM_WORDS, init, act, update, lambda state: greedy_policy(state.q), values=lambda state: state.q

@@ -10,13 +10,13 @@ from jrcjax.model.states import num_states
 
 
 def round_robin(spec: Spec, config: Config) -> Learner:
-    """Action t mod A in slot t, whatever the state; in the long run the uniform policy."""
+    """Action t mod A in step t, whatever the state; in the long run the uniform policy."""
     del config
     uniform = jnp.full((num_states(spec.shape), spec.num_actions), 1.0 / spec.num_actions)
     return Learner(
         num_words=0,
         init=lambda key, hparams, source=None: (),
-        act=lambda state, state_id, slot, words, hparams: (slot % spec.num_actions).astype(jnp.int32),
-        update=lambda state, transition, slot, words, hparams: state,
+        act=lambda state, state_id, step, words, hparams: (step % spec.num_actions).astype(jnp.int32),
+        update=lambda state, transition, step, words, hparams: state,
         policy=lambda state: uniform,
     )

@@ -1,6 +1,6 @@
 """Temporal-difference targets and losses, one function an equation (the paper's section V).
 
-Functions work on tables over all states, [S, A], or on rows of a batch, [B, A]; gathering by ids is the caller's.
+Functions of values take those of one state, [A], or a table over all states, [S, A]; batches are the caller's `vmap`.
 """
 
 from __future__ import annotations
@@ -11,18 +11,22 @@ import chex
 import jax
 import jax.numpy as jnp
 
-from jrcjax.types import Float, Int
+from jrcjax.readings import Loss
+from jrcjax.types import Bool, Float, Int
 
 
-def double_q_value(q_online: Float, q_target: Float, axis: int = 1) -> Float:
-    """Q(s', argmax_a Q(s', a; theta); theta'), the value in equation (15); [N, A], [N, A] to [N].
+def value_of(q: Float, is_action: Bool) -> Float:
+    """Q(s, a) of one action, of values [A] and what is true for that action alone, [A].
 
-    With actions along the other axis: `axis` 0.
+    The same as q[action]. As a sum it stays part of the loops around it, and columns stay columns under `vmap`.
     """
-    chex.assert_equal_shape([q_online, q_target])
-    chex.assert_rank(q_online, 2)
-    best = jnp.argmax(q_online, axis=axis, keepdims=True)
-    return jnp.take_along_axis(q_target, best, axis=axis).squeeze(axis)
+    return jnp.where(is_action, q, 0.0).sum()
+
+
+def double_q_value(q_online: Float, q_target: Float) -> Float:
+    """Q(s', argmax_a Q(s', a; theta); theta'), the value in equation (15), of values [A] of both networks in s'."""
+    chex.assert_rank([q_online, q_target], 1)
+    return q_target[jnp.argmax(q_online)]
 
 
 def td_target(reward: Float, discount: Float, next_value: Float) -> Float:
@@ -30,10 +34,17 @@ def td_target(reward: Float, discount: Float, next_value: Float) -> Float:
     return reward + discount * next_value
 
 
-def squared_td_loss(td_error: Float) -> Float:
-    """Mean of (y - Q)^2 over the mini-batch [B], equations (16) and (20)."""
-    chex.assert_rank(td_error, 1)  # a mean over a broadcast pair would be silently wrong
-    return jnp.mean(jnp.square(td_error))
+def td_loss(td_error: Float, loss: Int, delta: Float) -> Float:
+    """(y - Q)^2, or the Huber loss: beyond an error of `delta` the straight line that continues the square; any shape.
+
+    Args:
+      td_error: y - Q.
+      loss: the reading `Loss`.
+      delta: where the line begins.
+    """
+    limit = jnp.where(loss == Loss.HUBER, delta, jnp.inf)
+    slope = 2.0 * jax.lax.stop_gradient(jnp.clip(td_error, -limit, limit))
+    return slope * td_error - jnp.square(slope / 2.0)
 
 
 def q_learning_error(q: Float, state: Int, action: Int, reward: Float, next_state: Int, discount: Float) -> Float:
@@ -46,19 +57,16 @@ def robbins_monro_step(visits: Int, exponent: Float) -> Float:
     return jnp.maximum(visits, 1).astype(jnp.float32) ** -exponent
 
 
-def large_margin_loss(q: Float, expert: Int, margin: Float, axis: int = 1) -> Float:
+def large_margin_loss(q: Float, is_expert: Bool, margin: Float) -> Float:
     """max_a [Q(s, a) + Gamma(a_E, a)] - Q(s, a_E), equation (29), with Gamma the margin for a != a_E and 0 for a_E.
 
     Args:
-      q: [B, A] values of the demonstrated states.
-      expert: [B] the demonstrator's actions a_E.
+      q: [A] values of the demonstrated state.
+      is_expert: [A], true for the demonstrator's action a_E alone.
       margin: a scalar.
-      axis: that of the actions; 0 for q of [A, B].
     """
-    chex.assert_rank([q, expert], [2, 1])
-    is_expert = jax.nn.one_hot(expert, q.shape[axis], dtype=bool, axis=axis)
-    best = jnp.max(q + jnp.where(is_expert, 0.0, margin), axis=axis)
-    return best - jnp.where(is_expert, q, 0.0).sum(axis=axis)
+    chex.assert_rank([q, is_expert], 1)
+    return jnp.max(q + jnp.where(is_expert, 0.0, margin)) - value_of(q, is_expert)
 
 
 def l2_loss(weights: Any) -> Float:

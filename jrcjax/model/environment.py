@@ -7,26 +7,27 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 from flax import struct
+from jaxtyping import Array, Bool, Float, Int
 
 from jrcjax.checks import require, require_keys, require_type
 from jrcjax.model import slot, states
 from jrcjax.model.params import EnvParams, check_params
 from jrcjax.model.presets import paper_params
 from jrcjax.model.spaces import Box, Discrete
-from jrcjax.types import Bool, Float, Int, Key
+from jrcjax.types import Key
 
 _ONE_KEY = "one key, as jax.random.key returns it; use vmap for several"
 
 
 @struct.dataclass
 class EnvState:
-    """Where an episode is; scalars."""
+    """Where an episode is; scalars, or arrays of one shape for several episodes."""
 
-    id: Int
+    id: Int[Array, ...]
     """State id."""
-    time: Int
+    time: Int[Array, ...]
     """Slots since the episode began."""
-    first: Int
+    first: Int[Array, ...]
     """Id of the episode's first state, for the reading `reward_state`."""
 
 
@@ -79,11 +80,11 @@ class JRCEnv:
         """Scaled factor levels."""
         return Box(0.0, 1.0, (len(self._given(params).shape),))
 
-    def get_obs(self, state: EnvState, params: EnvParams | None = None) -> Float:
+    def get_obs(self, state: EnvState, params: EnvParams | None = None) -> Float[Array, " F"]:
         """Observation of a state, [5]."""
         return states.features_of(state.id, self._given(params).shape)
 
-    def reset_env(self, key: Key, params: EnvParams) -> tuple[Float, EnvState]:
+    def reset_env(self, key: Key, params: EnvParams) -> tuple[Float[Array, " F"], EnvState]:
         """Observation and state at the start of an episode."""
         require_type("params", params, EnvParams)
         require_keys(key, 0, _ONE_KEY)
@@ -92,13 +93,13 @@ class JRCEnv:
         state = EnvState(first, jnp.int32(0), first)
         return self.get_obs(state, params), state
 
-    def reset(self, key: Key, params: EnvParams | None = None) -> tuple[Float, EnvState]:
+    def reset(self, key: Key, params: EnvParams | None = None) -> tuple[Float[Array, " F"], EnvState]:
         """Observation and state at the start of an episode."""
         return self.reset_env(key, self._given(params))
 
     def step_env(
-        self, key: Key, state: EnvState, action: Int | int, params: EnvParams
-    ) -> tuple[Float, EnvState, Float, Bool, dict[str, Any]]:
+        self, key: Key, state: EnvState, action: Int[Array, ""] | int, params: EnvParams
+    ) -> tuple[Float[Array, " F"], EnvState, Float[Array, ""], Bool[Array, ""], dict[str, Any]]:
         """One slot without reset: (obs, state, reward, terminated, info)."""
         _check_step(key, state, action, params)
         words = jax.random.bits(key, (slot.NUM_WORDS,), jnp.uint32)
@@ -108,13 +109,13 @@ class JRCEnv:
         terminated = (new.time >= params.max_steps_in_episode) & (params.terminal_time_limit == 1)
         return self.get_obs(new, params), new, outcome.reward, terminated, info
 
-    def is_truncated(self, state: EnvState, params: EnvParams) -> Bool:
+    def is_truncated(self, state: EnvState, params: EnvParams) -> Bool[Array, ""]:
         """Whether the time limit cuts the episode here, without being part of the problem."""
         return (state.time >= params.max_steps_in_episode) & (params.terminal_time_limit == 0)
 
     def step(
-        self, key: Key, state: EnvState, action: Int | int, params: EnvParams | None = None
-    ) -> tuple[Float, EnvState, Float, Bool, Bool, dict[str, Any]]:
+        self, key: Key, state: EnvState, action: Int[Array, ""] | int, params: EnvParams | None = None
+    ) -> tuple[Float[Array, " F"], EnvState, Float[Array, ""], Bool[Array, ""], Bool[Array, ""], dict[str, Any]]:
         """One slot with automatic reset.
 
         Returns:
@@ -134,7 +135,7 @@ class JRCEnv:
         return obs, new, reward, terminated, truncated, info
 
 
-def _check_step(key: Key, state: EnvState, action: Int | int, params: EnvParams) -> None:
+def _check_step(key: Key, state: EnvState, action: Int[Array, ""] | int, params: EnvParams) -> None:
     require_type("params", params, EnvParams)
     require_type("state", state, EnvState)
     require_keys(key, 0, _ONE_KEY)

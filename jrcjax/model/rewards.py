@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
 
-from jrcjax.types import Bool, Float
 
-
-def reward(is_data: Bool, event: Bool, packets: Float, miss_ratio: Float, weights: Float) -> Float:
+def reward(
+    is_data: Bool[Array, ...],
+    event: Bool[Array, ...],
+    packets: Float[Array, ...],
+    miss_ratio: Float[Array, ...],
+    weights: Float[Array, " 4"],
+) -> Float[Array, ...]:
     """rho_t, equation (11); all arguments but `weights` scalars or of one shape.
 
     Args:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, Int, UInt32
 
 from jrcjax import rng
 from jrcjax.model import metrics, states
@@ -15,7 +16,6 @@ from jrcjax.model.rewards import reward
 from jrcjax.model.transitions import initial_levels, next_levels
 from jrcjax.radar.bank import slot_miss_ratio
 from jrcjax.readings import RewardState
-from jrcjax.types import Bool, Float, Int, Words
 
 NUM_WORDS = len(FACTORS) + 2
 """Random words of one slot: the factors, the event, the placement."""
@@ -24,22 +24,28 @@ NUM_WORDS = len(FACTORS) + 2
 class Outcome(NamedTuple):
     """What one slot gives; scalars."""
 
-    next_state: Int
-    reward: Float
-    event: Bool
-    is_data: Bool
-    packets: Float
+    next_state: Int[Array, ""]
+    reward: Float[Array, ""]
+    event: Bool[Array, ""]
+    is_data: Bool[Array, ""]
+    packets: Float[Array, ""]
     """Packets delivered."""
-    miss_ratio: Float
+    miss_ratio: Float[Array, ""]
     """p_k(t); 1 in a slot spent on data."""
 
 
-def initial_state(words: Words, params: EnvParams) -> Int:
+def initial_state(words: UInt32[Array, " W"], params: EnvParams) -> Int[Array, ""]:
     """State id at the start of an episode, from words [NUM_WORDS]."""
     return states.id_of(initial_levels(rng.uniform(words[: len(FACTORS)]), params), params.shape)
 
 
-def run_slot(words: Words, state: Int, action: Int, params: EnvParams, first: Int | None = None) -> Outcome:
+def run_slot(
+    words: UInt32[Array, " W"],
+    state: Int[Array, ""],
+    action: Int[Array, ""],
+    params: EnvParams,
+    first: Int[Array, ""] | None = None,
+) -> Outcome:
     """Runs one slot.
 
     Args:
@@ -68,7 +74,7 @@ def run_slot(words: Words, state: Int, action: Int, params: EnvParams, first: In
     )
 
 
-def _deciding_state(state: Int, first: Int | None, params: EnvParams) -> Int:
+def _deciding_state(state: Int[Array, ""], first: Int[Array, ""] | None, params: EnvParams) -> Int[Array, ""]:
     """The state that a slot's event, packets and reward belong to."""
     if first is None:
         return state

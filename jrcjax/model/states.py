@@ -9,8 +9,7 @@ from __future__ import annotations
 import math
 
 import jax.numpy as jnp
-
-from jrcjax.types import Float, Int
+from jaxtyping import Array, Float, Int
 
 
 def num_states(shape: tuple[int, ...]) -> int:
@@ -18,7 +17,7 @@ def num_states(shape: tuple[int, ...]) -> int:
     return math.prod(shape)
 
 
-def levels_of(state: Int, shape: tuple[int, ...]) -> Int:
+def levels_of(state: Int[Array, "*batch"], shape: tuple[int, ...]) -> Int[Array, "*batch F"]:
     """Levels (c, r, w, v, m) of state ids [...]; [..., F]."""
     levels = []
     for size in reversed(shape):
@@ -27,7 +26,7 @@ def levels_of(state: Int, shape: tuple[int, ...]) -> Int:
     return jnp.stack(levels[::-1], axis=-1)
 
 
-def id_of(levels: Int, shape: tuple[int, ...]) -> Int:
+def id_of(levels: Int[Array, "*batch F"], shape: tuple[int, ...]) -> Int[Array, "*batch"]:
     """State ids [...] of levels [..., F]."""
     state = jnp.zeros_like(levels[..., 0])
     for factor, size in enumerate(shape):
@@ -35,7 +34,7 @@ def id_of(levels: Int, shape: tuple[int, ...]) -> Int:
     return state
 
 
-def features_of(state: Int, shape: tuple[int, ...]) -> Float:
+def features_of(state: Int[Array, "*batch"], shape: tuple[int, ...]) -> Float[Array, "*batch F"]:
     """What an agent observes in states [...]: each level scaled to [0, 1]; [..., F] float32."""
     levels = levels_of(state, shape).astype(jnp.float32)
     largest = jnp.maximum(jnp.asarray(shape, jnp.float32) - 1.0, 1.0)

@@ -18,6 +18,7 @@ from jaxtyping import Array, Float, Int
 from jrcjax import rng
 from jrcjax.checks import is_positive, is_traced, refuse, require
 from jrcjax.containers import NOT_NEGATIVE, PROBABILITY, count, derived, integer, option
+from jrcjax.keys import key_of
 from jrcjax.radar.modes import Modes, fresh_miss_ratio, fresh_miss_ratio_of, fresh_placement, room_for
 from jrcjax.radar.placement import Footprints
 from jrcjax.types import Key, Words
@@ -74,7 +75,7 @@ def make_radar(*, max_density: float | None = None, **fields: Any) -> Radar:
 
 def bank_key(seed: Int[Array, ""], mode: int | Int[Array, ""], i: Int[Array, ""]) -> Key:
     """The key of placement number `i` of a mode in the bank with this seed."""
-    return jax.random.fold_in(jax.random.fold_in(jax.random.key(seed), mode), i)
+    return jax.random.fold_in(jax.random.fold_in(key_of(seed), mode), i)
 
 
 def bank_of(modes: Modes, seed: Int[Array, ""], size: int) -> Float[Array, "K B"]:
@@ -120,7 +121,7 @@ def slot_miss_ratio(word: Words, mode: Int[Array, ""], radar: Radar) -> Float[Ar
     Drawn from the bank, or from a placement made afresh; both have the same distribution over slots.
     """
     if radar.placements == "fresh":
-        return fresh_miss_ratio_of(jax.random.key(word), mode, radar)
+        return fresh_miss_ratio_of(key_of(word), mode, radar)
     bank = radar.miss_bank
     return bank[mode, rng.index(word, bank.shape[-1])]
 
@@ -128,7 +129,7 @@ def slot_miss_ratio(word: Words, mode: Int[Array, ""], radar: Radar) -> Float[Ar
 def slot_placement(word: Words, mode: int, radar: Radar) -> tuple[Int[Array, ""], Footprints]:
     """The placement whose miss ratio `slot_miss_ratio` gives for the same word; `mode` is static."""
     if radar.placements == "fresh":
-        return fresh_placement(jax.random.key(word), mode, radar)
+        return fresh_placement(key_of(word), mode, radar)
     number = rng.index(word, radar.miss_bank.shape[-1])
     return fresh_placement(bank_key(radar.bank_seed, mode, number), mode, radar)
 

@@ -15,33 +15,33 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 from jax.custom_batching import custom_vmap
+from jaxtyping import Array, Bool, Float, Int
 
 from jrcjax.radar.placement import Footprints
 from jrcjax.readings import CountingRule, Distance
-from jrcjax.types import Bool, Float, Int
 
 
 class Boxes(NamedTuple):
     """Rectangles sorted by `y`; leading axes [...] are independent placements."""
 
-    x: Float
+    x: Float[Array, "... N"]
     """[..., N] centre across the sort axis, m."""
-    y: Float
+    y: Float[Array, "... N"]
     """[..., N] centre along the sort axis, m, ascending up to `quantum`."""
-    half_x: Float
+    half_x: Float[Array, "... N"]
     """[..., N] half extent, m."""
-    half_y: Float
+    half_y: Float[Array, "... N"]
     """[..., N] half extent, m."""
-    quantum: Float
+    quantum: Float[Array, ...]
     """[...] by how much neighbours in the order may be out of order, m."""
 
 
-def miss_ratio(count: Int, detected: Int) -> Float:
+def miss_ratio(count: Int[Array, ...], detected: Int[Array, ...]) -> Float[Array, ...]:
     """p_k = (omega - N_k) / omega, equation (5); zero when there is nothing to miss."""
     return jnp.where(count > 0, (count - detected) / jnp.maximum(count, 1), 0.0).astype(jnp.float32)
 
 
-def boxes(footprints: Footprints, distance: Int) -> Boxes:
+def boxes(footprints: Footprints, distance: Int[Array, ""]) -> Boxes:
     """Rectangles whose gap is the wanted distance measure, sorted; absent objects lie far from all.
 
     Args:
@@ -51,7 +51,7 @@ def boxes(footprints: Footprints, distance: Int) -> Boxes:
     return _sorted_boxes(footprints, distance)[0]
 
 
-def _sorted_boxes(footprints: Footprints, distance: Int) -> tuple[Boxes, Int]:
+def _sorted_boxes(footprints: Footprints, distance: Int[Array, ""]) -> tuple[Boxes, Int[Array, " N"]]:
     """`boxes`, and the indices [N] of the objects that they belong to."""
     x, y = footprints.centre[:, 0], footprints.centre[:, 1]
     radial = distance == Distance.RADIAL_RANGE
@@ -65,7 +65,7 @@ def _sorted_boxes(footprints: Footprints, distance: Int) -> tuple[Boxes, Int]:
     return Boxes(across[order], along[order], extent[order, 0], extent[order, 1], quantum), order
 
 
-def _order(along: Float, present: Bool) -> tuple[Int, Float]:
+def _order(along: Float[Array, " N"], present: Bool[Array, " N"]) -> tuple[Int[Array, " N"], Float[Array, ""]]:
     """Indices [N] that sort the present objects by `along` to within the returned quantum, the absent ones last.
 
     Position and index share one 32-bit integer, because XLA's CPU sort of one integer array is seven times as fast as
@@ -82,12 +82,12 @@ def _order(along: Float, present: Bool) -> tuple[Int, Float]:
     return (key & jnp.uint32(2**index_bits - 1)).astype(jnp.int32), quantum
 
 
-def _late(values: jax.Array, shift: Int, n: int) -> jax.Array:
+def _late(values: Array, shift: Int[Array, ""], n: int) -> Array:
     """Values of the objects that come `shift` places later, [..., n]."""
     return jax.lax.dynamic_slice_in_dim(values, shift, n, axis=-1)
 
 
-def _over_near_pairs(box: Boxes, resolution: Float, combine: Callable, initial: jax.Array) -> jax.Array:
+def _over_near_pairs(box: Boxes, resolution: Float[Array, ...], combine: Callable, initial: Array) -> Array:
     """Folds `combine(values, near, shift)` over shifts 1, 2, ... of the sorted objects.
 
     Args:
@@ -137,7 +137,7 @@ def _shared_loop(function: Callable) -> Callable:
 
 
 @_shared_loop
-def is_merged(box: Boxes, resolution: Float) -> Bool:
+def is_merged(box: Boxes, resolution: Float[Array, ...]) -> Bool[Array, "... N"]:
     """Which objects are unresolved from at least one other; [..., N] for boxes [..., N], resolution [...]."""
     n = box.x.shape[-1]
 
@@ -149,7 +149,7 @@ def is_merged(box: Boxes, resolution: Float) -> Bool:
 
 
 @_shared_loop
-def cluster_label(box: Boxes, resolution: Float) -> Int:
+def cluster_label(box: Boxes, resolution: Float[Array, ...]) -> Int[Array, "... N"]:
     """Smallest index in each object's cluster of transitively unresolved objects; same shapes as `is_merged`.
 
     Labels spread to neighbours, then jump to the label of their label, until a round changes nothing.
@@ -172,13 +172,15 @@ def cluster_label(box: Boxes, resolution: Float) -> Int:
     return jax.lax.while_loop(lambda carry: carry[1], round_, (start, jnp.bool_(True)))[0]
 
 
-def merged_objects(footprints: Footprints, resolution: Float, distance: Int) -> Bool:
+def merged_objects(footprints: Footprints, resolution: Float[Array, ""], distance: Int[Array, ""]) -> Bool[Array, " N"]:
     """Which of N objects are unresolved from at least one other, [N]; arguments as for `detected_objects`."""
     box, order = _sorted_boxes(footprints, distance)
     return jnp.zeros(order.shape, bool).at[order].set(is_merged(box, resolution))
 
 
-def detected_objects(footprints: Footprints, resolution: Float, distance: Int, rule: Int) -> Int:
+def detected_objects(
+    footprints: Footprints, resolution: Float[Array, ""], distance: Int[Array, ""], rule: Int[Array, ""]
+) -> Int[Array, ""]:
     """N_k, the number of detected objects, a scalar.
 
     Args:

@@ -6,34 +6,35 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, Int
 
 from jrcjax.readings import CountModel
-from jrcjax.types import Float, Int, Key
+from jrcjax.types import Key
 
 
 class Footprints(NamedTuple):
     """Axis-aligned rectangular footprints of N objects, of which `present` marks the real ones."""
 
-    centre: Float
-    """[N, 2] position in m, the vehicle at the origin, looking along the first axis."""
-    size: Float
-    """[N, 2] length (first axis) and width in m."""
-    present: jax.Array
-    """[N] bool."""
+    centre: Float[Array, "N 2"]
+    """Position in m, the vehicle at the origin, looking along the first axis."""
+    size: Float[Array, "N 2"]
+    """Length (first axis) and width in m."""
+    present: Bool[Array, " N"]
+    """Which are real."""
 
 
 class ObjectClasses(NamedTuple):
     """Shares and normal size distributions of the C classes of objects (Table I: cars, pedestrians)."""
 
-    share: Float
-    """[C], sums to 1."""
-    size_mean: Float
-    """[C, 2] mean length and width in m."""
-    size_std: Float
-    """[C, 2] standard deviations in m."""
+    share: Float[Array, " C"]
+    """Sums to 1."""
+    size_mean: Float[Array, "C 2"]
+    """Mean length and width in m."""
+    size_std: Float[Array, "C 2"]
+    """Standard deviations in m."""
 
 
-def object_count(key: Key, mean: Float, model: Int) -> Int:
+def object_count(key: Key, mean: Float[Array, ""], model: Int[Array, ""]) -> Int[Array, ""]:
     """Number of objects in one placement, a scalar.
 
     Args:
@@ -48,7 +49,9 @@ def object_count(key: Key, mean: Float, model: Int) -> Int:
     return jnp.where(is_poisson, drawn, fixed)
 
 
-def place_objects(key: Key, count: Int, side: Float, classes: ObjectClasses, capacity: int) -> Footprints:
+def place_objects(
+    key: Key, count: Int[Array, ""], side: Float[Array, ""], classes: ObjectClasses, capacity: int
+) -> Footprints:
     """Places `count` objects uniformly and independently in a square (the paper, section VI-A.2).
 
     The vehicle stands in the middle of the near edge. The first round(share * count) objects are of

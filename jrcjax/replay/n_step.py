@@ -1,4 +1,4 @@
-"""n-step returns: the paper's equation (28), built up slot by slot and cut at the time limit."""
+"""n-step returns: the paper's equation (28), built up step by step and cut at the time limit."""
 
 from __future__ import annotations
 
@@ -18,38 +18,36 @@ class NStepTransition(NamedTuple):
     action: Int
     reward: Float
     next_state: Int
-    terminal: Int
-    """1 if the episode ended for good after this slot."""
+    discount: Float
+    """gamma, or 0 if the episode ended for good after this step."""
     n_return: Float
     """R_t^(n) = sum over k < n of gamma^k rho_{t+k}; fewer terms where the episode's time limit comes first."""
     n_discount: Float
-    """gamma^n for as many slots as the return has; 0 if the episode ended for good."""
+    """gamma^n for as many steps as the return has; 0 if the episode ended for good."""
     n_state: Int
     """s_{t+n}, or the episode's last state."""
 
 
 def init(n: int) -> NStepTransition:
-    """A window of the last n transitions, oldest first; its content means nothing before n slots have passed."""
+    """A window of the last n transitions, oldest first; its content means nothing before n steps have passed."""
     ids, numbers = jnp.zeros(n, jnp.int32), jnp.zeros(n, jnp.float32)
-    return NStepTransition(ids, ids, numbers, ids, ids, numbers, numbers, ids)
+    return NStepTransition(ids, ids, numbers, ids, numbers, numbers, numbers, ids)
 
 
-def push(window: NStepTransition, transition: Transition, position: Int, discount: Float) -> NStepTransition:
-    """The window one slot later; from the n-th slot on its first transition is complete.
+def push(window: NStepTransition, transition: Transition, position: Int) -> NStepTransition:
+    """The window one step later; from the n-th step on its first transition is complete.
 
     Args:
       window: [n] transitions, oldest first.
-      transition: what happened in this slot, scalars.
-      position: the slot's number in its episode, from 0.
-      discount: gamma.
+      transition: what happened in this step, scalars.
+      position: the step's number in its episode, from 0.
     """
     new = NStepTransition(*transition, n_return=0.0, n_discount=1.0, n_state=transition.next_state)  # pyright: ignore
     window = jax.tree.map(lambda old, x: jnp.append(old[1:], jnp.asarray(x, old.dtype)), window, new)
     age = jnp.arange(window.state.shape[0])[::-1]
     goes_on = age <= position  # younger than the episode
-    step_discount = jnp.where(transition.terminal == 1, 0.0, discount)
     return window._replace(
         n_return=jnp.where(goes_on, window.n_return + window.n_discount * transition.reward, window.n_return),
-        n_discount=jnp.where(goes_on, window.n_discount * step_discount, window.n_discount),
+        n_discount=jnp.where(goes_on, window.n_discount * transition.discount, window.n_discount),
         n_state=jnp.where(goes_on, transition.next_state, window.n_state),
     )

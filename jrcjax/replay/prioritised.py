@@ -12,6 +12,7 @@ import jax.numpy as jnp
 
 from jrcjax.replay import packing, sum_tree
 from jrcjax.replay.n_step import NStepTransition
+from jrcjax.replay.packing import NUMBER, SWITCH
 from jrcjax.types import Bool, Float, Int, Words
 
 NUM_WORDS = sum_tree.NUM_WORDS
@@ -19,14 +20,14 @@ NUM_WORDS = sum_tree.NUM_WORDS
 
 
 class Layout(NamedTuple):
-    """The static side of a memory."""
+    """How transitions and priorities lie in memory."""
 
     rows: packing.Layout
     tree: sum_tree.Layout
     demonstrations: int
 
 
-class Memory(NamedTuple):
+class Replay(NamedTuple):
     """Transitions and their priorities."""
 
     rows: Words
@@ -50,66 +51,69 @@ class Sample(NamedTuple):
     """[B]."""
 
 
-def layout(num_states: int, num_actions: int, capacity: int, demonstrations: int) -> Layout:
-    """The layout of a memory for `capacity` transitions, the first of them demonstrations."""
-    sizes = (num_states, num_actions, None, num_states, 2, None, None, num_states)
-    return Layout(packing.layout(NStepTransition, sizes), sum_tree.layout(capacity), demonstrations)
+def layout_of(num_states: int, num_actions: int, capacity: int, demonstrations: int) -> Layout:
+    """The layout for `capacity` transitions, the first of them demonstrations."""
+    fields = (num_states, num_actions, NUMBER, num_states, SWITCH, NUMBER, NUMBER, num_states)
+    return Layout(packing.layout_of(NStepTransition, fields), sum_tree.layout_of(capacity), demonstrations)
 
 
-def init(demonstrations: NStepTransition, where: Layout) -> Memory:
-    """A memory of demonstrations alone, all with priority 1."""
-    free = where.tree.leaves - where.demonstrations
-    rows = jnp.pad(packing.pack(demonstrations, where.rows), ((0, free), (0, 0)))
-    priorities = (jnp.arange(where.tree.leaves) < where.demonstrations).astype(jnp.float32)
-    return Memory(rows, sum_tree.init(priorities, where.tree), jnp.float32(1.0))
+def init(demonstrations: NStepTransition, layout: Layout) -> Replay:
+    """Demonstrations alone, all with priority 1."""
+    free = layout.tree.leaves - layout.demonstrations
+    rows = jnp.pad(packing.pack(demonstrations, layout.rows), ((0, free), (0, 0)))
+    priorities = (jnp.arange(layout.tree.leaves) < layout.demonstrations).astype(jnp.float32)
+    return Replay(rows, sum_tree.init(priorities, layout.tree), jnp.float32(1.0))
 
 
-def size(count: Int, where: Layout) -> Int:
+def size(count: Int, layout: Layout) -> Int:
     """|D_re|, transitions held after `count` new ones were added."""
-    return where.demonstrations + jnp.minimum(count, where.tree.leaves - where.demonstrations)
+    return layout.demonstrations + jnp.minimum(count, layout.tree.leaves - layout.demonstrations)
 
 
-def add(memory: Memory, transition: NStepTransition, count: Int, where: Layout) -> Memory:
-    """Writes new transition number `count` (from 0) over the oldest new one; before the first (`count` < 0) nothing.
+def add(replay: Replay, transition: NStepTransition, count: Int, layout: Layout) -> Replay:
+    """Writes new transition number `count` (from 0) over the oldest new one.
 
-    With a `count` that is the same for all agents under vmap the memory is written in place.
+    If `count` < 0 there is no new transition yet, and nothing is stored.
+
+    With a `count` that is the same for all agents under vmap the rows are written in place.
     """
-    ring = where.tree.leaves - where.demonstrations
-    position = where.demonstrations + jnp.maximum(count, 0) % ring
-    row = packing.pack(transition, where.rows)[None]
-    priority = jnp.where(count < 0, 0.0, memory.largest)
-    return memory._replace(
-        rows=jax.lax.dynamic_update_slice(memory.rows, row, (position, 0)),
-        tree=sum_tree.update_one(memory.tree, position, priority, where.tree),
+    ring = layout.tree.leaves - layout.demonstrations
+    position = layout.demonstrations + jnp.maximum(count, 0) % ring
+    row = packing.pack(transition, layout.rows)[None]
+    priority = jnp.where(count < 0, 0.0, replay.largest)
+    return replay._replace(
+        rows=jax.lax.dynamic_update_slice(replay.rows, row, (position, 0)),
+        tree=sum_tree.update_one(replay.tree, position, priority, layout.tree),
     )
 
 
-def sample(memory: Memory, words: Words, where: Layout) -> Sample:
+def sample(replay: Replay, words: Words, layout: Layout, discount: Float) -> Sample:
     """Draws a mini-batch with replacement, transition i with the probability P(i) of equation (23).
 
     Args:
-      memory: the memory.
+      replay: the transitions.
       words: [NUM_WORDS, B] random words.
-      where: the memory's layout.
+      layout: how they lie there.
+      discount: gamma of the transitions after which the episode went on.
     """
     # The values come with the indices: reading them from the tree again would not be ordered before its update, and XLA
     # would copy the whole tree in every step.
-    indices, values = sum_tree.sample(memory.tree, words, where.tree)
-    rows = memory.rows.at[indices].get(mode="promise_in_bounds")
-    probability = values / sum_tree.total(memory.tree, where.tree)
-    return Sample(packing.unpack(rows, where.rows), indices, probability, indices < where.demonstrations)
+    indices, values = sum_tree.sample(replay.tree, words, layout.tree)
+    rows = replay.rows.at[indices].get(mode="promise_in_bounds")
+    probability = values / sum_tree.total(replay.tree, layout.tree)
+    return Sample(packing.unpack(rows, layout.rows, discount), indices, probability, indices < layout.demonstrations)
 
 
-def priority(td_error: Float, is_demonstration: Bool, constant: Float, bonus: Float) -> Float:
-    """p_i = |zeta_i| + epsilon, below equation (23); demonstrations have an epsilon of their own, `bonus`."""
-    return jnp.abs(td_error) + jnp.where(is_demonstration, bonus, constant)
+def priority(td_error: Float, is_demonstration: Bool, constant: Float, of_demonstrations: Float) -> Float:
+    """p_i = |zeta_i| + epsilon, below equation (23); demonstrations have a constant of their own, if it is larger."""
+    return jnp.abs(td_error) + jnp.where(is_demonstration, jnp.maximum(of_demonstrations, constant), constant)
 
 
-def set_priorities(memory: Memory, indices: Int, priorities: Float, exponent: Float, where: Layout) -> Memory:
+def set_priorities(replay: Replay, indices: Int, priorities: Float, exponent: Float, layout: Layout) -> Replay:
     """Stores p_i^alpha for priorities p_i > 0, [B] each; what is sampled twice has equal ones."""
     scaled = jnp.exp(exponent * jnp.log(priorities))  # the power function of XLA on a CPU is not vectorised
-    largest = jnp.maximum(memory.largest, scaled.max())
-    return memory._replace(tree=sum_tree.update(memory.tree, indices, scaled, where.tree), largest=largest)
+    largest = jnp.maximum(replay.largest, scaled.max())
+    return replay._replace(tree=sum_tree.update(replay.tree, indices, scaled, layout.tree), largest=largest)
 
 
 def importance_weights(probability: Float, size: Int, exponent: Float) -> Float:

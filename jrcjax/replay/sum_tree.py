@@ -1,9 +1,16 @@
 """A sum tree: values that are drawn in proportion to their size, and replaced, in logarithmic time.
 
-All nodes lie in one array with the values of a node's children in its row, so that one look-up fetches all children and
-touches one cache line. The tree ends where a level has few rows, which are searched all at once. Nodes are always
-recomputed from their children and never adjusted by differences: rounding can't pile up, however many updates there
-are.
+All nodes lie in one array. A row holds the values of one node's children, so that one look-up fetches all of them and
+touches one cache line. The rows of one level follow each other, the parents of the leaves first. With 10 leaves a to j
+and 2 children per node, if the top level had at most 3 rows:
+
+    row            level                     holds
+    0 1 2 3 4      0, parents of leaves      a b | c d | e f | g h | i j
+    5 6 7          1, the top                0 1 | 2 3 | 4 .       sums of rows 0 to 4; the last column is empty
+
+Leaf i lies in row i // 2, column i % 2; the sum of that row lies in row 5 + (i // 2) // 2, column (i // 2) % 2. The
+tree ends where a level has few rows, which are searched all at once. Nodes are always recomputed from their children
+and never adjusted by differences: rounding can't pile up, however many updates there are.
 """
 
 from __future__ import annotations
@@ -17,8 +24,6 @@ import jax.numpy as jnp
 from jrcjax import rng
 from jrcjax.types import Float, Int, Words
 
-RADIX = 4
-"""Children per node, a power of two; of 4, 8, 16 and 32 the fastest for 50,000 leaves, 64 draws and 64 updates."""
 _TOP_ROWS = 16  # rows of the top level, at most
 NUM_WORDS = 2
 """Random words of one draw."""
@@ -28,118 +33,119 @@ class Layout(NamedTuple):
     """Where the nodes lie; levels count from the parents of the leaves upwards."""
 
     leaves: int
-    first_node: tuple[int, ...]
-    """Row of each level's first node."""
-    nodes: int
-    """Rows of the array."""
+    children: int
+    """Children per node, a power of two: the length of a row."""
+    first_row: tuple[int, ...]
+    """Where each level begins."""
+    rows: int
+    """Rows of all levels."""
+
+    def parent(self, index: Int) -> Int:
+        """The row, counted from its level's first one, in which child number `index` lies."""
+        return index >> (self.children.bit_length() - 1)  # a division would take care of negative numbers
+
+    def column(self, index: Int) -> Int:
+        """Where in that row the child lies."""
+        return index & (self.children - 1)
 
 
-def layout(leaves: int) -> Layout:
-    """The tree over so many leaves."""
-    first_node, nodes, size = [], 0, leaves
-    while not first_node or size > _TOP_ROWS:
-        size = -(-size // RADIX)
-        first_node.append(nodes)
-        nodes += size
-    return Layout(leaves, tuple(first_node), nodes)
+def layout_of(leaves: int, children: int = 4) -> Layout:
+    """The tree over so many leaves; of 4, 8, 16 and 32 children 4 are the fastest for 50,000 leaves and 64 draws."""
+    first_row, rows, size = [], 0, leaves
+    while not first_row or size > _TOP_ROWS:
+        size = -(-size // children)
+        first_row.append(rows)
+        rows += size
+    return Layout(leaves, children, tuple(first_row), rows)
 
 
-def init(values: Float, where: Layout) -> Float:
-    """The tree with these leaves, [leaves] values >= 0, as [nodes, RADIX]."""
+def init(values: Float, layout: Layout) -> Float:
+    """The tree with these leaves, [leaves] values >= 0, as [rows, children]."""
     levels = []
-    for _ in where.first_node:
-        rows = jnp.pad(values, (0, -values.shape[0] % RADIX)).reshape(-1, RADIX)
+    for _ in layout.first_row:
+        rows = jnp.pad(values, (0, -values.shape[0] % layout.children)).reshape(-1, layout.children)
         levels.append(rows)
         values = rows.sum(axis=-1)
     return jnp.concatenate(levels)
 
 
-def leaves(tree: Float, indices: Int) -> Float:
+def leaves(tree: Float, indices: Int, layout: Layout) -> Float:
     """Values of the leaves with these indices; any shape."""
-    return tree.at[_row(indices), _column(indices)].get(mode="promise_in_bounds")
+    return tree.at[layout.parent(indices), layout.column(indices)].get(mode="promise_in_bounds")
 
 
-def total(tree: Float, where: Layout) -> Float:
+def total(tree: Float, layout: Layout) -> Float:
     """Sum of all leaves."""
-    return _top(tree, where).sum()
+    return _top(tree, layout).sum()
 
 
-def _top(tree: Float, where: Layout) -> Float:
-    return tree[where.first_node[-1] :]
-
-
-def _row(index: Int) -> Int:
-    """A child's parent; a division would take care of negative numbers."""
-    return index >> (RADIX.bit_length() - 1)
-
-
-def _column(index: Int) -> Int:
-    return index & (RADIX - 1)
+def _top(tree: Float, layout: Layout) -> Float:
+    return tree[layout.first_row[-1] :]
 
 
 def _sum(rows: Float) -> Float:
-    """Sums of rows [..., RADIX], written out so that XLA joins them with the look-up of the rows."""
-    return functools.reduce(operator.add, (rows[..., k] for k in range(RADIX)))
+    """Sums of rows [..., children], written out so that XLA joins them with the look-up of the rows."""
+    return functools.reduce(operator.add, (rows[..., k] for k in range(rows.shape[-1])))
 
 
-def update(tree: Float, indices: Int, values: Float, where: Layout) -> Float:
+def update(tree: Float, indices: Int, values: Float, layout: Layout) -> Float:
     """Gives the leaves `indices` [B] the values [B].
 
     If an index appears more than once the last of its values counts, on an accelerator any of them; every sum agrees
     with its leaves in either case.
     """
-    *lower, top = where.first_node
-    for first_node in lower:
-        row = first_node + _row(indices)
-        tree = tree.at[row, _column(indices)].set(values, mode="promise_in_bounds")
+    *lower, top = layout.first_row
+    for first_row in lower:
+        row = first_row + layout.parent(indices)
+        tree = tree.at[row, layout.column(indices)].set(values, mode="promise_in_bounds")
         values = _sum(tree.at[row].get(mode="promise_in_bounds"))
-        indices = _row(indices)
-    return tree.at[top + _row(indices), _column(indices)].set(values, mode="promise_in_bounds")
+        indices = layout.parent(indices)
+    return tree.at[top + layout.parent(indices), layout.column(indices)].set(values, mode="promise_in_bounds")
 
 
-def update_one(tree: Float, index: Int, value: Float, where: Layout) -> Float:
+def update_one(tree: Float, index: Int, value: Float, layout: Layout) -> Float:
     """Gives one leaf a value.
 
     With an `index` that is the same for all agents under vmap the tree is written in place.
     """
-    # All nodes on the path are read first and written together, which XLA does in place.
+    # All rows on the path are read first and written together, which XLA does in place.
     indices = [index]
-    for _ in where.first_node[1:]:
-        indices.append(_row(indices[-1]))
-    path = jnp.stack([first_node + _row(i) for first_node, i in zip(where.first_node, indices, strict=True)])
+    for _ in layout.first_row[1:]:
+        indices.append(layout.parent(indices[-1]))
+    path = jnp.stack([first + layout.parent(i) for first, i in zip(layout.first_row, indices, strict=True)])
     rows = []
-    for children, i in zip(tree.at[path].get(mode="promise_in_bounds"), indices, strict=True):
-        rows.append(jnp.where(jnp.arange(RADIX) == _column(i), value, children))
+    for row, i in zip(tree.at[path].get(mode="promise_in_bounds"), indices, strict=True):
+        rows.append(jnp.where(jnp.arange(layout.children) == layout.column(i), value, row))
         value = _sum(rows[-1])
     return tree.at[path].set(jnp.stack(rows), mode="promise_in_bounds")
 
 
-def sample(tree: Float, words: Words, where: Layout) -> tuple[Int, Float]:
+def sample(tree: Float, words: Words, layout: Layout) -> tuple[Int, Float]:
     """Draws leaves in proportion to their values, with replacement.
 
     Args:
       tree: a tree whose positive leaves come first, at least one of them; the others are zero.
       words: [NUM_WORDS, B] random words.
-      where: the tree's layout.
+      layout: the tree's layout.
 
     Returns:
       Indices of the leaves and their values, [B] each.
     """
-    *lower, _ = where.first_node
-    top = _top(tree, where)
+    *lower, _ = layout.first_row
+    top = _top(tree, layout)
     node = _node_at(top, rng.uniform(words[0]))
     value = top.reshape(-1)[node]
     # Two words, since the 24 bits of one uniform number are too coarse for 50,000 leaves.
     rest = rng.uniform(words[1]) * value
-    for first_node in reversed(lower):
-        child, value, rest = _child_at(tree.at[first_node + node].get(mode="promise_in_bounds"), rest)
-        node = node * RADIX + child
+    for first_row in reversed(lower):
+        child, value, rest = _child_at(tree.at[first_row + node].get(mode="promise_in_bounds"), rest)
+        node = node * layout.children + child
     return node, value
 
 
 def _node_at(rows: Float, share: Float) -> Int:
-    """Which of the values [N, RADIX] lies at these shares [B] of their running sum, among the positive ones, [B]."""
-    within = rows @ jnp.triu(jnp.ones((RADIX, RADIX)))  # sums up to each value
+    """Which of the values [N, children] lies at these shares [B] of their running sum, among the positive ones, [B]."""
+    within = rows @ jnp.triu(jnp.ones((rows.shape[1],) * 2))  # sums up to each value
     before = jnp.tril(jnp.ones((rows.shape[0],) * 2), -1) @ within[:, -1]
     running = before[:, None] + within
     at = share * running[-1, -1]
@@ -150,8 +156,8 @@ def _node_at(rows: Float, share: Float) -> Int:
 
 
 def _child_at(children: Float, rest: Float) -> tuple[Int, Float, Float]:
-    """Which of children [B, RADIX] lies at `rest` [B] of their running sum; its value; how far into it."""
-    values = [children[:, k] for k in range(RADIX)]
+    """Which of children [B, N] lies at `rest` [B] of their running sum; its value; how far into it."""
+    values = [children[:, k] for k in range(children.shape[1])]
     child = jnp.zeros(rest.shape, jnp.int32)
     while len(values) > 1:
         half = len(values) // 2

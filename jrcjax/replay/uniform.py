@@ -19,26 +19,28 @@ class Transition(NamedTuple):
     action: Int
     reward: Float
     next_state: Int
-    terminal: Int
-    """1 if the episode ended for good, so that nothing is bootstrapped; 0 also at a time limit that truncates."""
+    discount: Float
+    """gamma, or 0 if the episode ended for good, so that nothing is bootstrapped. A time limit that truncates leaves it
+    at gamma."""
 
 
-def layout(num_states: int, num_actions: int) -> packing.Layout:
+def layout_of(num_states: int, num_actions: int) -> packing.Layout:
     """How transitions are packed: two words in the paper's problem."""
-    return packing.layout(Transition, (num_states, num_actions, None, num_states, 2))
+    return packing.layout_of(Transition, (num_states, num_actions, packing.NUMBER, num_states, packing.SWITCH))
 
 
-def init(capacity: int, where: packing.Layout) -> Words:
+def init(capacity: int, layout: packing.Layout) -> Words:
     """An empty ring, [capacity, words]."""
-    return jnp.zeros((capacity, where.words), jnp.uint32)
+    return jnp.zeros((capacity, layout.words), jnp.uint32)
 
 
-def add(ring: Words, transition: Transition, count: Int, where: packing.Layout) -> Words:
+def add(ring: Words, transition: Transition, count: Int, layout: packing.Layout) -> Words:
     """Writes the transition that is number `count` (from 0) over the oldest one.
 
     With a `count` that is the same for all agents under vmap the ring is written in place.
     """
-    return jax.lax.dynamic_update_slice(ring, packing.pack(transition, where)[None], (count % ring.shape[0], 0))
+    row = packing.pack(transition, layout)[None]
+    return jax.lax.dynamic_update_slice(ring, row, (count % ring.shape[0], 0))
 
 
 def draw(words: Words, count: Int, capacity: int) -> Int:
@@ -46,6 +48,6 @@ def draw(words: Words, count: Int, capacity: int) -> Int:
     return rng.index(words, jnp.minimum(count, capacity))
 
 
-def at(ring: Words, positions: Int, where: packing.Layout) -> Transition:
-    """The transitions at these positions; any shape."""
-    return packing.unpack(ring.at[positions].get(mode="promise_in_bounds"), where)
+def at(ring: Words, positions: Int, layout: packing.Layout, discount: Float) -> Transition:
+    """The transitions at these positions, of any shape; `discount` is gamma, of which a ring keeps whether it is 0."""
+    return packing.unpack(ring.at[positions].get(mode="promise_in_bounds"), layout, discount)

@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from jrcjax.checks import refuse
+from jrcjax.keys import key_of
 from jrcjax.learners import Learner, Source, Spec
 from jrcjax.learners.hparams import Config, HParams
 from jrcjax.learners.q_function import q_function
@@ -22,7 +23,7 @@ def agent_bytes(learner: Learner, spec: Spec, config: Config) -> int:
     """Bytes of one agent with its source, if it needs one, and the random words of an episode."""
 
     def agent():
-        key, source = jax.random.key(0), None
+        key, source = key_of(0), None
         if learner.needs_source:
             numbers = jnp.zeros(config.demonstrations, jnp.int32)  # as large as the floats among them
             demonstrations = NStepTransition(*[numbers] * len(NStepTransition._fields))

@@ -15,17 +15,17 @@ import jax.numpy as jnp
 from jrcjax import rng
 from jrcjax.checks import refuse
 from jrcjax.exact import LongRun, evaluate_policy
+from jrcjax.keys import Purpose
 from jrcjax.learners import Learner, LearnerFactory, Source, Spec, exploration, make_learner
 from jrcjax.learners.hparams import Config, HParams, check_config, check_hparams
 from jrcjax.model import metrics, slot
 from jrcjax.model.params import EnvParams, check_params
-from jrcjax.replay.uniform import Transition
+from jrcjax.training.acting import NUM_WORDS, act_in_slot
 from jrcjax.training.divergence import has_diverged
 from jrcjax.types import Bool, Float, Int, Key, Words
 
 ENUMERABLE = 2**20
 """States up to which a policy is evaluated exactly after each episode, which takes some 200 MB per agent there."""
-_INIT, _EPISODES = 0, 1  # purposes of an agent's key
 
 
 class AgentState(NamedTuple):
@@ -87,10 +87,10 @@ def learner_for(learner: str | LearnerFactory, env_params: EnvParams, config: Co
 
 def init_agent(key: Key, hparams: HParams, learner: Learner, source: Source | None = None) -> AgentState:
     """An agent before its first episode; learners that transfer need a `source`."""
-    return AgentState(key, learner.init(jax.random.fold_in(key, _INIT), hparams, source))
+    return AgentState(key, learner.init(jax.random.fold_in(key, Purpose.INIT), hparams, source))
 
 
-def run_slot(
+def train_in_slot(
     carry: tuple[Int, Any, metrics.Metrics],
     words: Words,
     drawn: Any,
@@ -104,7 +104,7 @@ def run_slot(
 
     Args:
       carry: state id, learner state, sums of the metrics.
-      words: random words of the slot: the environment's, then the action's.
+      words: [NUM_WORDS] random words of the slot.
       drawn: what the learner drew for its update.
       number: slots before this one, the same for all agents.
       last: whether the slot is the episode's last.
@@ -113,11 +113,11 @@ def run_slot(
       learner: the learning rule.
     """
     state, learner_state, sums = carry
-    of_slot, of_action = jnp.split(words, [slot.NUM_WORDS])
-    action = learner.act(learner_state, state, number, of_action, hparams)
-    outcome = slot.run_slot(of_slot, state, action, env_params)
-    terminal = last & (env_params.terminal_time_limit == 1)
-    transition = Transition(state, action, outcome.reward, outcome.next_state, terminal.astype(jnp.int32))
+
+    def act(words: Words) -> Int:
+        return learner.act(learner_state, state, number, words, hparams)
+
+    transition, outcome = act_in_slot(words, state, act, last, env_params, hparams.discount)
     learner_state = learner.update(learner_state, transition, number, drawn, hparams)
     return outcome.next_state, learner_state, slot.measure(sums, outcome, env_params)
 
@@ -128,14 +128,14 @@ def run_episode(
     """Episode number `episode` (from 0, the same for all agents): the agent after it, and its log (scalars)."""
     slots = env_params.max_steps_in_episode
     num_words = slot.NUM_WORDS + max(learner.num_words, exploration.NUM_WORDS)
-    key = jax.random.fold_in(jax.random.fold_in(agent.key, _EPISODES), episode)
+    key = jax.random.fold_in(jax.random.fold_in(agent.key, Purpose.EPISODES), episode)
     words = rng.bits(key, (slots + 1, num_words))
-    of_slots, of_updates = jnp.split(words[:slots], [slot.NUM_WORDS + exploration.NUM_WORDS], axis=1)
+    of_slots, of_updates = jnp.split(words[:slots], [NUM_WORDS], axis=1)
     numbers = episode * slots + jnp.arange(slots)
 
     def one_slot(carry, xs):
         words, drawn, number, i = xs
-        return run_slot(carry, words, drawn, number, i == slots - 1, env_params, hparams, learner), None
+        return train_in_slot(carry, words, drawn, number, i == slots - 1, env_params, hparams, learner), None
 
     start = (slot.initial_state(words[slots, : slot.NUM_WORDS], env_params), agent.learner, metrics.zero())
     (_, learner_state, sums), _ = jax.lax.scan(

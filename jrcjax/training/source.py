@@ -5,20 +5,21 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 
+from jrcjax import rng
 from jrcjax.checks import refuse, require_keys, require_type
-from jrcjax.learners import Source, Spec, exploration
+from jrcjax.keys import Purpose, key_of
+from jrcjax.learners import Source, Spec
+from jrcjax.learners.fixed import FIXED, FixedState
 from jrcjax.learners.hparams import Config, HParams
 from jrcjax.learners.q_function import q_function
 from jrcjax.model import slot
 from jrcjax.model.params import EnvParams
 from jrcjax.replay import n_step
 from jrcjax.replay.n_step import NStepTransition
-from jrcjax.replay.uniform import Transition
+from jrcjax.training.acting import NUM_WORDS, act_in_slot
 from jrcjax.training.footprint import check_memory
 from jrcjax.training.rollout import Log, check_training, init_agent, learner_for, run_episodes, spec_of
-from jrcjax.types import Float, Key
-
-_DEMONSTRATIONS = 3  # purpose of an agent's key, beside those in jrcjax.training.rollout
+from jrcjax.types import Float, Int, Key, Words
 
 
 def demonstrate(key: Key, policy: Float, env_params: EnvParams, hparams: HParams, config: Config) -> NStepTransition:
@@ -36,21 +37,22 @@ def demonstrate(key: Key, policy: Float, env_params: EnvParams, hparams: HParams
     Returns:
       The transitions with their n-step returns, [demonstrations] each.
     """
-    number_of_words = slot.NUM_WORDS + exploration.NUM_WORDS
-    words = jax.random.bits(key, (config.demonstrations, 2 * slot.NUM_WORDS + exploration.NUM_WORDS), jnp.uint32)
+    words = rng.bits(key, (config.demonstrations, NUM_WORDS + slot.NUM_WORDS))
+    slots, demonstrator = env_params.max_steps_in_episode, FixedState(policy, hparams.demonstration_epsilon)
 
     def one_slot(carry, xs):
         state, window = carry
         words, i = xs
-        of_slot, of_action, of_start = jnp.split(words, [slot.NUM_WORDS, number_of_words])
-        position = i % env_params.max_steps_in_episode
+        of_slot, of_start = jnp.split(words, [NUM_WORDS])
+        position = i % slots
         state = jnp.where(position == 0, slot.initial_state(of_start, env_params), state)
-        action = exploration.epsilon_greedy(of_action, policy[state], hparams.demonstration_epsilon)
-        outcome = slot.run_slot(of_slot, state, action, env_params)
-        terminal = (position == env_params.max_steps_in_episode - 1) & (env_params.terminal_time_limit == 1)
-        transition = Transition(state, action, outcome.reward, outcome.next_state, terminal.astype(jnp.int32))
-        window = n_step.push(window, transition, position, hparams.discount)
-        return (outcome.next_state, window), jax.tree.map(lambda field: field[0], window)
+
+        def act(words: Words) -> Int:
+            return FIXED.act(demonstrator, state, i, words, hparams)
+
+        transition, _ = act_in_slot(of_slot, state, act, position == slots - 1, env_params, hparams.discount)
+        window = n_step.push(window, transition, position)
+        return (transition.next_state, window), jax.tree.map(lambda field: field[0], window)
 
     start = (jnp.int32(0), n_step.init(config.n_step))
     (_, window), complete = jax.lax.scan(one_slot, start, (words, jnp.arange(config.demonstrations)))
@@ -63,7 +65,7 @@ def demonstrate(key: Key, policy: Float, env_params: EnvParams, hparams: HParams
 
 def source_of(key: Key, policy: Float, weights, env_params: EnvParams, hparams: HParams, config: Config) -> Source:
     """The source that an agent trained with `key` hands on."""
-    key = jax.random.fold_in(key, _DEMONSTRATIONS)
+    key = jax.random.fold_in(key, Purpose.DEMONSTRATIONS)
     return Source(weights, demonstrate(key, policy, env_params, hparams, config))
 
 
@@ -103,7 +105,7 @@ def check_source(source: Source, spec: Spec, config: Config) -> None:
         if jnp.shape(field) != (config.demonstrations,):
             allowed = f"shape ({config.demonstrations},), as config.demonstrations has it"
             refuse(f"source.demonstrations.{name}", f"shape {jnp.shape(field)}", allowed)
-    wanted = jax.eval_shape(q_function(spec, config).init, jax.random.key(0))
+    wanted = jax.eval_shape(q_function(spec, config).init, key_of(0))
     same_tree = jax.tree.structure(source.weights) == jax.tree.structure(wanted)
     if not same_tree or jax.tree.map(jnp.shape, source.weights) != jax.tree.map(jnp.shape, wanted):
         shapes = jax.tree.map(jnp.shape, source.weights)

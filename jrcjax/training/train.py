@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from jrcjax.checks import refuse, require_keys, require_type
+from jrcjax.keys import Purpose
 from jrcjax.learners import Learner, LearnerFactory, Source, Spec, make_learner
 from jrcjax.learners.hparams import Config, HParams
 from jrcjax.model.params import EnvParams
@@ -18,8 +19,6 @@ from jrcjax.training.parallel import over_agents, pad_agents, padded
 from jrcjax.training.rollout import AgentState, Log, check_training, init_agent, learner_for, run_episodes, spec_of
 from jrcjax.training.source import check_source, train_source
 from jrcjax.types import Key
-
-_SOURCE = 2  # purpose of an agent's key, beside those in jrcjax.training.rollout
 
 
 def train(
@@ -68,7 +67,7 @@ def _from_scratch(
 ) -> tuple[AgentState, Log]:
     env_params, hparams, paper_source = shared
     if paper_source is not None:
-        source, _ = train_source(jax.random.fold_in(key, _SOURCE), paper_source, hparams, config)
+        source, _ = train_source(jax.random.fold_in(key, Purpose.SOURCE), paper_source, hparams, config)
     agent = init_agent(key, hparams, learner, source)
     return run_episodes(agent, 0, config.episodes, env_params, hparams, learner)
 

@@ -9,7 +9,7 @@ import pandas as pd
 
 from jrcjax.files import write_text
 from paper_figs.plots import style
-from paper_figs.studies import robustness
+from paper_figs.studies import multiverse, robustness
 from sweeps.preset import slots_of
 from sweeps.results import store
 from sweeps.studies.robustness import SOURCE, TARGET
@@ -37,3 +37,22 @@ def summarise_robustness(sweeps: tuple[Sweep, ...], size: Size, out: Path) -> li
     tables = robustness.tables(results, slots_of(size.preset))
     pictures = style.save(robustness.draw(tables), folder / "robustness")
     return [*_write(folder, tables), *pictures, _manifests(folder, sweeps, out)]
+
+
+def summarise_multiverse(sweeps: tuple[Sweep, ...], size: Size, out: Path) -> list[Path]:
+    """Tables of a multiverse, in OUT/multiverse/summary."""
+    folder = out / "multiverse" / "summary"
+    folder.mkdir(parents=True, exist_ok=True)
+    judged = []
+    for sweep in sweeps:
+        assert sweep.source
+        source, target = (store.load(out / part.name, size.seeds) for part in (sweep.source, sweep))
+        judged += multiverse.of_readings(source, target)
+    found = multiverse.verdicts(judged)
+    tables = {
+        "readings": multiverse.readings([number for number, _ in judged]),
+        "verdicts": found,
+        "claims": multiverse.shares(found),
+        **multiverse.decisive(found),
+    }
+    return [*_write(folder, tables), _manifests(folder, sweeps, out)]

@@ -6,10 +6,13 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from jrcjax import exact
 from jrcjax.config.paths import Points
 from jrcjax.learners.schedules import epsilon
+
+_AT_ONCE = 9  # points of Figs. 6 to 8
 
 
 class Reference(NamedTuple):
@@ -32,10 +35,17 @@ def reference_of(points: Points, episodes: int) -> Reference:
         best = exact.optimal_policy(params)
 
         def explored(episode):
-            random = epsilon(episode * slots + jnp.arange(slots), hparams).mean()
+            random = epsilon(episode * slots + jnp.arange(slots), hparams, slots).mean()
             return exact.evaluate_policy(params, (1 - random) * best + random / params.num_actions)
 
         optimum, constant = (exact.evaluate_policy(params, p) for p in (best, exact.best_constant_action(params)))
         return Reference(optimum, constant, jax.vmap(explored)(jnp.arange(episodes)))
 
-    return jax.jit(jax.vmap(at))(points)
+    # Some points at a time, in programs of one shape: the policies of many points and episodes would fill the memory.
+    number, of_points = points.hparams.discount.shape[0], jax.jit(jax.vmap(at))
+    size = min(number, _AT_ONCE)
+    parts = []
+    for first in range(0, number, size):
+        rows = np.minimum(np.arange(first, first + size), number - 1)
+        parts.append(jax.tree.map(np.asarray, of_points(jax.tree.map(lambda leaf, rows=rows: leaf[rows], points))))
+    return jax.tree.map(lambda *leaves: np.concatenate(leaves)[:number], *parts)

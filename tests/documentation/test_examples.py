@@ -60,10 +60,10 @@ def test_own_learner_update_by_hand():
     module = example("own_learner")
     learner = module.expected_sarsa(Spec((2,) * 5, 4, 300), jrcjax.Config())
     table = module.Table(jnp.zeros((32, 4)).at[5].set(jnp.array([30.0, 0.0, 0.0, 0.0])), jnp.zeros((32, 4)))
-    new = learner.update(table, Transition(2, 1, 7.0, 5, 0), 0, None, jrcjax.HParams())
+    new = learner.update(table, Transition(2, 1, 7.0, 5, 0.99), 0, None, jrcjax.HParams())
     first = np.e / (np.e + 3)  # the chance of an action that is one temperature better than three others
     assert float(new.q[2, 1]) == pytest.approx(7.0 + 0.99 * first * 30.0, rel=1e-5)
-    again = learner.update(new, Transition(2, 1, 7.0, 5, 1), 1, None, jrcjax.HParams())
+    again = learner.update(new, Transition(2, 1, 7.0, 5, 0.0), 1, None, jrcjax.HParams())
     assert float(again.q[2, 1]) == pytest.approx(float(new.q[2, 1]) + 2**-0.7 * (7.0 - float(new.q[2, 1])), rel=1e-5)
     words = jax.random.bits(jax.random.key(0), (4000, 2), jnp.uint32)
     actions = jax.vmap(lambda w: learner.act(table, jnp.int32(5), 0, w, jrcjax.HParams()))(words)

@@ -36,7 +36,9 @@ def test_updates_against_equation_13(exponent, constant):
     for i in range(300):
         s, a, following = generator.integers(0, NUM_STATES, 3) % (NUM_STATES, 4, NUM_STATES)
         reward, terminal = float(np.float32(generator.normal(0, 10))), int(generator.uniform() < 0.2)
-        transition = Transition(np.int32(s), np.int32(a), np.float32(reward), np.int32(following), np.int32(terminal))
+        transition = Transition(
+            np.int32(s), np.int32(a), np.float32(reward), np.int32(following), np.float32(0.0 if terminal else 0.99)
+        )
         state = update(state, transition, i, jnp.zeros(0, jnp.uint32), hparams)
         visits[s, a] += 1
         step = constant or visits[s, a] ** -exponent

@@ -69,15 +69,15 @@ class Parts:
 
 def loss_and_gradient(layers, target_layers, batch, is_demonstration, importance, hparams: HParams):
     """Equations (25) to (29), one transition after the other; and J's gradient with respect to `layers`."""
-    gamma, lambdas = float(hparams.discount), (float(hparams.n_step_weight), float(hparams.margin_weight))
+    lambdas = float(hparams.n_step_weight), float(hparams.margin_weight)
     online, frozen = (forward(each, FEATURES)[-1].T for each in (layers, target_layers))
     rows = list(zip(*batch, strict=True))
     activations = forward(layers, FEATURES[:, [int(row[0]) for row in rows]])
     delta = np.zeros_like(activations[-1])
     parts = Parts(0.0, 0.0, 0.0, sum((array**2).sum() for layer in layers for array in layer), np.zeros(len(rows)))
-    for i, (s, a, reward, s_next, terminal, n_return, n_discount, s_n) in enumerate(rows):
+    for i, (s, a, reward, s_next, discount, n_return, n_discount, s_n) in enumerate(rows):
         share = importance[i] / len(rows)
-        bootstrap = 0.0 if terminal else gamma * frozen[s_next][online[s_next].argmax()]  # a^max is theta's choice
+        bootstrap = discount * frozen[s_next][online[s_next].argmax()]  # a^max is theta's choice
         error = reward + bootstrap - online[s, a]
         n_error = n_return + n_discount * frozen[s_n].max() - online[s, a]
         parts.td_error[i] = error
@@ -131,9 +131,14 @@ class Problem:
         return loss_and_gradient(theta, theta_target, self.batch, self.is_demonstration, self.importance, self.hparams)
 
 
+def with_discount(transitions, gamma: float):
+    """Discounts of gamma, or 0 where they are 0."""
+    return transitions._replace(discount=np.where(transitions.discount == 0, 0.0, float(np.float32(gamma))))
+
+
 def problem(form="table", hidden=(24, 24), size=64, seed=1, demonstrations=0.5, **numbers) -> Problem:
     config, generator = Config(hidden=hidden, form=form), np.random.default_rng([seed, 7])
-    batch = random_demonstrations(SPEC, size, seed, scale=3.0)
+    batch = with_discount(random_demonstrations(SPEC, size, seed, scale=3.0), numbers.get("discount", 0.99))
     return Problem(
         q_function(SPEC, config),
         *(random_weights(SPEC, config, 10 * seed + i) for i in (1, 2)),
@@ -146,7 +151,6 @@ def problem(form="table", hidden=(24, 24), size=64, seed=1, demonstrations=0.5, 
 
 CASES = [
     UNEQUAL,
-    UNEQUAL | {"discount": 0.0},
     UNEQUAL | {"n_step_weight": 0.0},
     UNEQUAL | {"margin_weight": 0.0},
     UNEQUAL | {"l2_weight": 0.0},
@@ -161,11 +165,11 @@ def test_loss_and_gradient_against_backpropagation_by_hand(form, hidden):
     for seed, numbers in enumerate(CASES, start=1):
         given = problem(form, hidden, seed=seed, **numbers)
         assert 0 < given.is_demonstration.sum() < 64
-        assert 0 < given.batch.terminal.sum() < 64
+        assert 0 < (given.batch.discount == 0).sum() < 64
         parts, wanted = given.by_hand()
         # Otherwise the test could not tell double Q-learning from its single form, nor a margin from none.
         online, other = (forward(layers_of(w), FEATURES)[-1].argmax(axis=0) for w in (given.weights, given.target))
-        assert (online != other)[given.batch.next_state[given.batch.terminal == 0]].any()
+        assert (online != other)[given.batch.next_state[given.batch.discount > 0]].any()
         assert parts.margin > 0
         got, gradient = jax.value_and_grad(given.loss)(given.weights)
         np.testing.assert_allclose(got, parts.total(given.hparams), rtol=1e-5)
@@ -180,7 +184,7 @@ def test_loss_and_gradient_against_backpropagation_by_hand(form, hidden):
 def test_backpropagation_by_hand_against_differences():
     """The reference itself: where the targets are held, its gradient is the slope of its loss."""
     given = problem(hidden=(7,), size=16, seed=3, **UNEQUAL)
-    given.batch = given.batch._replace(terminal=np.ones(16, int))  # a^max may not move
+    given.batch = given.batch._replace(discount=np.zeros(16))  # a^max may not move
     theta, theta_target = layers_of(given.weights), layers_of(given.target)
     run = lambda layers: loss_and_gradient(  # noqa: E731
         layers, theta_target, given.batch, given.is_demonstration, given.importance, given.hparams
@@ -276,7 +280,7 @@ class Algorithm2(Descent):
         end_of_episode = (number // slots + 1) * slots
         following = self.history[number : min(number + self.config.n_step, end_of_episode)]
         n_return = sum(gamma**k * reward for k, (_, _, reward, _, _) in enumerate(following))
-        ended = following[-1][4] == 1
+        ended = following[-1][4] == 0
         row = (*self.history[number], n_return, 0.0 if ended else gamma ** len(following), following[-1][3])
         if len(self.memory) < self.config.replay_capacity:
             self.memory.append(row)
@@ -288,8 +292,8 @@ class Algorithm2(Descent):
 
     def draw(self, group_word, word) -> int:
         """A transition below one node of the tree's top, by its share of the priorities (23): first the node."""
-        levels = len(sum_tree.layout(self.config.replay_capacity).first_node)
-        size = sum_tree.RADIX ** (levels - 1)
+        levels = len(sum_tree.layout_of(self.config.replay_capacity).first_row)
+        size = 4 ** (levels - 1)
         groups = [self.priorities[i : i + size] for i in range(0, len(self.priorities), size)]
         group = search([np.sum(each) for each in groups], uniform(group_word))
         return group * size + search(groups[group], uniform(word))
@@ -317,11 +321,11 @@ class Algorithm2(Descent):
 
 
 def assert_same_memory(memory, twin: Algorithm2):
-    where = prioritised.layout(STATES, SPEC.num_actions, twin.config.replay_capacity, twin.config.demonstrations)
-    held = packing.unpack(memory.rows[: len(twin.memory)], where.rows)
+    layout = prioritised.layout_of(STATES, SPEC.num_actions, twin.config.replay_capacity, twin.config.demonstrations)
+    held = packing.unpack(memory.rows[: len(twin.memory)], layout.rows, twin.hparams.discount)
     for got, wanted in zip(held, zip(*twin.memory, strict=True), strict=True):
         np.testing.assert_allclose(got, wanted, rtol=1e-5, atol=1e-5)
-    priorities = np.asarray(sum_tree.leaves(memory.tree, jnp.arange(twin.config.replay_capacity)))
+    priorities = np.asarray(sum_tree.leaves(memory.tree, jnp.arange(twin.config.replay_capacity), layout.tree))
     np.testing.assert_allclose(priorities[: len(twin.memory)], twin.priorities, rtol=1e-4)
     np.testing.assert_array_equal(priorities[len(twin.memory) :], 0)
     np.testing.assert_allclose(memory.largest, twin.largest, rtol=1e-4)
@@ -353,7 +357,7 @@ def test_updates_against_algorithm_2(case):
     config = Config(**small | {"n_step": 4, "hidden": (8,)} | settings)
     hparams = hparams_of(**{"target_period": 7, "learning_rate": 5e-3, "l2_weight": 1e-3} | numbers)
     learner, function = tlwd(SPEC, config), q_function(SPEC, config)
-    demonstrations = random_demonstrations(SPEC, config.demonstrations, 4)
+    demonstrations = with_discount(random_demonstrations(SPEC, config.demonstrations, 4), hparams.discount)
     source = Source(random_weights(SPEC, config, 5), on_device(demonstrations))
     # Not a key whose network has all hidden units off in some state: Adam's first step is by the rate up or down, the
     # values there are then equal for several actions, and rounding alone decides which of them is the largest.
@@ -368,19 +372,19 @@ def test_updates_against_algorithm_2(case):
     target = forward(twin.target, FEATURES)[-1].T
     kept = state.target.T if config.uses_table(STATES) else function.table(state.target)
     np.testing.assert_allclose(kept, target, rtol=0, atol=1e-4)
-    assert_same_memory(state.memory, twin)
+    assert_same_memory(state.replay, twin)
 
     generator, update = np.random.default_rng(9), jax.jit(learner.update)
     words = jax.random.bits(jax.random.key(10), (60, 16), jnp.uint32)
     for i in range(60):
         ends = int(case == "rows" and i % SPEC.episode_slots == SPEC.episode_slots - 1)
         s, a, s_next = (int(generator.integers(0, n)) for n in (STATES, SPEC.num_actions, STATES))
-        transition = (s, a, float(np.float32(generator.normal())), s_next, ends)
+        transition = (s, a, float(np.float32(generator.normal())), s_next, (1 - ends) * float(hparams.discount))
         as_arrays = on_device(Transition(*(np.array(x) for x in transition)))
         state = update(state, as_arrays, i, words[i], hparams)
         twin.train(transition, np.asarray(words[i]).reshape(2, 8))
         if i in (0, 2, 3, 4, 31, 34, 36, 59):  # before the first return is complete; around the moments of a full ring
-            assert_same_memory(state.memory, twin)
+            assert_same_memory(state.replay, twin)
     # Rounding: as for Algorithm 1, each of the 100 steps adds some 1e-7. The weights move by far more.
     assert_same_layers(layers_of(state.weights), twin.layers, 2e-5)
     moved = jax.tree.map(lambda w, f: np.abs(w - f).max() > 1e-2, twin.layers, start)

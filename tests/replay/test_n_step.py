@@ -38,7 +38,7 @@ def closed_form(transitions: Transition, ends: np.ndarray, n: int, gamma: float)
     for t, end in enumerate(ends):
         window = range(t, min(t + n, end))
         terms = [gamma**k * float(transitions.reward[i]) for k, i in enumerate(window)]
-        ended = any(transitions.terminal[i] for i in window)
+        ended = any(transitions.discount[i] == 0 for i in window)
         discount = 0.0 if ended else gamma ** len(window)
         rows.append((sum(terms), discount, int(transitions.next_state[window[-1]]), sum(map(abs, terms))))
     return Wanted(*map(np.array, zip(*rows, strict=True)))
@@ -57,17 +57,17 @@ def part(tree, rows):
 
 
 @partial(jax.jit, static_argnums=0)
-def windows(n: int, transitions: Transition, positions, gamma) -> NStepTransition:
+def windows(n: int, transitions: Transition, positions) -> NStepTransition:
     """The windows after each slot, [T, n]."""
 
     def one(window, xs):
-        window = n_step.push(window, *xs, gamma)
+        window = n_step.push(window, *xs)
         return window, window
 
     return jax.lax.scan(one, n_step.init(n), (transitions, positions))[1]
 
 
-def some_episodes(rng: np.random.Generator, lengths) -> tuple[Transition, np.ndarray, np.ndarray]:
+def some_episodes(rng: np.random.Generator, lengths, gamma: float) -> tuple[Transition, np.ndarray, np.ndarray]:
     """SLOTS slots in episodes of these lengths, some of which end for good; positions, and the ends of episodes."""
     stops = np.minimum(np.cumsum(lengths), SLOTS)
     starts = np.append(0, stops[:-1])
@@ -81,7 +81,8 @@ def some_episodes(rng: np.random.Generator, lengths) -> tuple[Transition, np.nda
     # States and rewards never repeat, so that none can be taken for another.
     rewards = (rng.permutation(SLOTS) * 3.7 - 50.0).astype(np.float32)
     next_states = rng.permutation(SLOTS).astype(np.int32) + 1000
-    return Transition(ids(32), ids(4), rewards, next_states, terminal), positions, ends
+    discounts = np.where(terminal == 1, 0, gamma).astype(np.float32)
+    return Transition(ids(32), ids(4), rewards, next_states, discounts), positions, ends
 
 
 EPISODES = st.lists(st.integers(1, 20), min_size=SLOTS, max_size=SLOTS)
@@ -90,8 +91,8 @@ EPISODES = st.lists(st.integers(1, 20), min_size=SLOTS, max_size=SLOTS)
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(st.integers(1, 12), EPISODES, st.sampled_from([0.0, 0.3, 0.9, 0.99]), st.integers(0, 2**32 - 1))
 def test_returns_against_the_sum(n, lengths, gamma, seed):
-    transitions, positions, ends = some_episodes(np.random.default_rng(seed), lengths)
-    seen = jax.device_get(windows(n, transitions, positions, jnp.float32(gamma)))
+    transitions, positions, ends = some_episodes(np.random.default_rng(seed), lengths, gamma)
+    seen = jax.device_get(windows(n, transitions, positions))
     assert seen.state.shape == (SLOTS, n)
     # From the n-th slot on the first row is complete.
     wanted = closed_form(transitions, ends, n, gamma)
@@ -104,14 +105,14 @@ def test_returns_against_the_sum(n, lengths, gamma, seed):
         assert_is(part(seen, now - 1), part(transitions, held), part(cut, held))
 
 
-def one_episode(rewards, terminal=()) -> tuple[Transition, np.ndarray]:
+def one_episode(rewards, gamma: float, terminal=()) -> tuple[Transition, np.ndarray]:
     slots = np.arange(len(rewards), dtype=np.int32)
-    ends = np.isin(slots, terminal).astype(np.int32)
-    return Transition(slots, slots % 4, np.float32(rewards), slots + 1, ends), slots
+    discounts = np.where(np.isin(slots, terminal), 0, gamma).astype(np.float32)
+    return Transition(slots, slots % 4, np.float32(rewards), slots + 1, discounts), slots
 
 
 def test_return_by_hand():
-    seen = windows(3, *one_episode([1.0, 10.0, 100.0, 1000.0]), jnp.float32(0.5))
+    seen = windows(3, *one_episode([1.0, 10.0, 100.0, 1000.0], 0.5))
     first = part(seen, (slice(2, None), 0))
     assert first.n_return.tolist() == [1.0 + 5.0 + 25.0, 10.0 + 50.0 + 250.0]
     assert first.n_discount.tolist() == [0.125, 0.125]
@@ -120,24 +121,24 @@ def test_return_by_hand():
 
 def test_end_for_good_by_hand():
     # The episode ends for good after its third slot, the next one begins.
-    transitions, slots = one_episode([1.0, 10.0, 100.0, 7.0, 7.0], terminal=[2])
-    first = part(windows(3, transitions, slots % 3, jnp.float32(0.5)), (slice(2, None), 0))
+    transitions, slots = one_episode([1.0, 10.0, 100.0, 7.0, 7.0], 0.5, terminal=[2])
+    first = part(windows(3, transitions, slots % 3), (slice(2, None), 0))
     assert first.n_return.tolist() == [31.0, 60.0, 100.0]
     assert first.n_discount.tolist() == [0.0, 0.0, 0.0]
     assert first.n_state.tolist() == [3, 3, 3]
 
 
 def test_time_limit_by_hand():
-    transitions, slots = one_episode([1.0, 10.0, 100.0, 7.0, 7.0])
-    first = part(windows(3, transitions, slots % 3, jnp.float32(0.5)), (slice(2, None), 0))
+    transitions, slots = one_episode([1.0, 10.0, 100.0, 7.0, 7.0], 0.5)
+    first = part(windows(3, transitions, slots % 3), (slice(2, None), 0))
     assert first.n_return.tolist() == [31.0, 60.0, 100.0]
     assert first.n_discount.tolist() == [0.125, 0.25, 0.5]
     assert first.n_state.tolist() == [3, 3, 3]
 
 
 def test_one_step_is_the_transition_itself():
-    transitions, slots = one_episode([1.0, 10.0, 100.0], terminal=[2])
-    seen = part(windows(1, transitions, slots, jnp.float32(0.9)), (slice(None), 0))
+    transitions, slots = one_episode([1.0, 10.0, 100.0], 0.9, terminal=[2])
+    seen = part(windows(1, transitions, slots), (slice(None), 0))
     np.testing.assert_array_equal(seen.n_return, transitions.reward)
     np.testing.assert_array_equal(seen.n_discount, np.float32([0.9, 0.9, 0.0]))
     np.testing.assert_array_equal(seen.n_state, transitions.next_state)
@@ -176,13 +177,14 @@ def test_demonstrations_follow_each_other(params, count, n):
     seen = demonstrated(params, count, n, discount=0.9)
     for name, field in seen._asdict().items():
         assert field.shape == (count,)
-        is_number = name in ("reward", "n_return", "n_discount")
+        is_number = name in ("reward", "discount", "n_return", "n_discount")
         assert field.dtype == (np.float32 if is_number else np.int32)
     slots = np.arange(count)
     last = slots % LENGTH == LENGTH - 1
     goes_on = ~last[:-1]
     np.testing.assert_array_equal(seen.next_state[:-1][goes_on], seen.state[1:][goes_on])
-    np.testing.assert_array_equal(seen.terminal, last & (int(params.terminal_time_limit) == 1))
+    ended = last & (int(params.terminal_time_limit) == 1)
+    np.testing.assert_array_equal(seen.discount, np.where(ended, 0, np.float32(0.9)))
     ends = np.minimum((slots // LENGTH + 1) * LENGTH, count)
     transitions = Transition(*seen[:5])
     assert_is(seen, transitions, closed_form(transitions, ends, n, 0.9))

@@ -8,16 +8,20 @@ from hypothesis import strategies as st
 
 from jrcjax.replay import packing, prioritised, uniform
 from jrcjax.replay.n_step import NStepTransition
+from jrcjax.replay.packing import NUMBER, SWITCH
 
+GAMMA = 0.75
 PAPER = (2**5, 4)  # states and actions of the paper's problem
-FLOATS = {"reward", "n_return", "n_discount"}
+NUMBERS = {"reward", "n_return", "n_discount"}
+FLOATS = NUMBERS | {"discount"}
 SIZES = [1, 2, 3, 32, 1000, 2**15, 10**6, 2**31 - 1]
 LAYOUTS = {
-    "uniform": uniform.layout,
-    "prioritised": lambda states, actions: prioritised.layout(states, actions, 4, 2).rows,
+    "uniform": uniform.layout_of,
+    "prioritised": lambda states, actions: prioritised.layout_of(states, actions, 4, 2).rows,
 }
-# A few fields of either sort in any order; layouts know no more of a NamedTuple than that.
-ANY_SIZES = st.lists(st.one_of(st.none(), st.sampled_from(SIZES), st.integers(1, 2**31 - 1)), min_size=1, max_size=8)
+# A few fields of any sort in any order; layouts know no more of a NamedTuple than that.
+NO_IDS = st.sampled_from([NUMBER, SWITCH])
+ANY_SIZES = st.lists(st.one_of(NO_IDS, st.sampled_from(SIZES), st.integers(1, 2**31 - 1)), min_size=1, max_size=8)
 
 
 def fields_of(*values) -> tuple:
@@ -25,19 +29,18 @@ def fields_of(*values) -> tuple:
     return values
 
 
-def assert_fields_lie_apart(where: packing.Layout, sizes) -> None:
+def assert_fields_lie_apart(layout: packing.Layout, sizes) -> None:
     """Every id has room for its largest value, every number a word of its own, no bit is used twice."""
-    taken = [0] * where.words
-    for (word, shift, bits), size in zip(where.fields, sizes, strict=True):
-        if size is None:
-            assert (shift, bits) == (0, 0)
-            mask = 2**32 - 1
+    taken = [0] * layout.words
+    for place, size in zip(layout.places, sizes, strict=True):
+        if size == NUMBER:
+            assert (place.shift, place.bits) == (0, 32)
         else:
-            assert size - 1 < 2**bits
-            mask = (2**bits - 1) << shift
+            assert (1 if size == SWITCH else size - 1) < 2**place.bits
+        mask = (2**place.bits - 1) << place.shift
         assert mask < 2**32
-        assert not taken[word] & mask
-        taken[word] |= mask
+        assert not taken[place.word] & mask
+        taken[place.word] |= mask
 
 
 @pytest.mark.parametrize(
@@ -45,11 +48,11 @@ def assert_fields_lie_apart(where: packing.Layout, sizes) -> None:
     [(*PAPER, 2), (1, 1, 2), (2**14, 4, 2), (2**15, 4, 3), (2**16, 2**15, 3), (2**31 - 1, 4, 4)],
 )
 def test_transitions_take_as_few_words_as_the_ids_fit(states, actions, words):
-    where = uniform.layout(states, actions)
-    assert where.kind is uniform.Transition
-    assert where.words == words
-    assert uniform.init(3, where).shape == (3, words)
-    assert_fields_lie_apart(where, (states, actions, None, states, 2))
+    layout = uniform.layout_of(states, actions)
+    assert layout.kind is uniform.Transition
+    assert layout.words == words
+    assert uniform.init(3, layout).shape == (3, words)
+    assert_fields_lie_apart(layout, (states, actions, NUMBER, states, SWITCH))
 
 
 @pytest.mark.parametrize(
@@ -57,17 +60,17 @@ def test_transitions_take_as_few_words_as_the_ids_fit(states, actions, words):
     [(*PAPER, 4), (1, 1, 4), (2**9, 8, 4), (2**10, 4, 5), (2**14, 4, 5), (2**31 - 1, 4, 7)],
 )
 def test_n_step_transitions_take_as_few_words_as_the_ids_fit(states, actions, words):
-    where = prioritised.layout(states, actions, 4, 2).rows
-    assert where.kind is NStepTransition
-    assert [bits == 0 for _, _, bits in where.fields] == [name in FLOATS for name in NStepTransition._fields]
-    assert where.words == words
-    assert_fields_lie_apart(where, (states, actions, None, states, 2, None, None, states))
+    layout = prioritised.layout_of(states, actions, 4, 2).rows
+    assert layout.kind is NStepTransition
+    assert [place.bits == 32 for place in layout.places] == [name in NUMBERS for name in NStepTransition._fields]
+    assert layout.words == words
+    assert_fields_lie_apart(layout, (states, actions, NUMBER, states, SWITCH, NUMBER, NUMBER, states))
 
 
 @settings(max_examples=150, deadline=None, derandomize=True)
 @given(sizes=ANY_SIZES)
 def test_fields_lie_apart(sizes):
-    assert_fields_lie_apart(packing.layout(fields_of, tuple(sizes)), sizes)
+    assert_fields_lie_apart(packing.layout_of(fields_of, tuple(sizes)), sizes)
 
 
 def some_ids(size: int):
@@ -75,22 +78,22 @@ def some_ids(size: int):
 
 
 def some_fields(data, kind, states: int, actions: int):
-    ids = {"action": some_ids(actions), "terminal": st.integers(0, 1)}
+    ids = {"action": some_ids(actions), "discount": st.sampled_from([0.0, GAMMA])}
     numbers = st.floats(width=32, allow_nan=False)
-    return kind(*(data.draw(numbers if f in FLOATS else ids.get(f, some_ids(states))) for f in kind._fields))
+    return kind(*(data.draw(numbers if f in NUMBERS else ids.get(f, some_ids(states))) for f in kind._fields))
 
 
 @pytest.mark.parametrize("name", LAYOUTS)
 @settings(max_examples=80, deadline=None, derandomize=True)
 @given(st.data(), st.sampled_from(SIZES), st.integers(1, 70_000))
 def test_pack_and_unpack_are_inverse(name, data, states, actions):
-    where = LAYOUTS[name](states, actions)
-    value = some_fields(data, where.kind, states, actions)
-    row = packing.pack(value, where)
-    assert row.shape == (where.words,)
+    layout = LAYOUTS[name](states, actions)
+    value = some_fields(data, layout.kind, states, actions)
+    row = packing.pack(value, layout)
+    assert row.shape == (layout.words,)
     assert row.dtype == jnp.uint32
-    back = packing.unpack(row, where)
-    assert isinstance(back, where.kind)
+    back = packing.unpack(row, layout, GAMMA)
+    assert isinstance(back, layout.kind)
     for field, name_of_field in zip(back, back._fields, strict=True):
         assert field.dtype == (jnp.float32 if name_of_field in FLOATS else jnp.int32)
     assert tuple(np.asarray(field).item() for field in back) == value
@@ -99,19 +102,20 @@ def test_pack_and_unpack_are_inverse(name, data, states, actions):
 @pytest.mark.parametrize("name", LAYOUTS)
 @pytest.mark.parametrize("shape", [(7,), (2, 3), (0,)])
 def test_rows_of_many(name, shape):
-    where = LAYOUTS[name](32, 4)
+    layout = LAYOUTS[name](32, 4)
     rng = np.random.default_rng(0)
     number = lambda: rng.normal(size=shape).astype(np.float32)  # noqa: E731
-    value = where.kind(*(number() if f in FLOATS else rng.integers(0, 2, shape) for f in where.kind._fields))
-    rows = packing.pack(value, where)
-    assert rows.shape == (*shape, where.words)
-    for got, wanted in zip(packing.unpack(rows, where), value, strict=True):
+    value = layout.kind(*(number() if f in NUMBERS else rng.integers(0, 2, shape) for f in layout.kind._fields))
+    value = value._replace(discount=value.discount * np.float32(GAMMA))
+    rows = packing.pack(value, layout)
+    assert rows.shape == (*shape, layout.words)
+    for got, wanted in zip(packing.unpack(rows, layout, GAMMA), value, strict=True):
         np.testing.assert_array_equal(got, wanted)
 
 
 @pytest.mark.parametrize("bits", [0, 1, 0x7F800000, 0xFF800000, 0x7FC00001, 0x80000000])
 def test_numbers_keep_their_bits(bits):
-    where = uniform.layout(32, 4)
+    layout = uniform.layout_of(32, 4)
     number = np.uint32(bits).view(np.float32)  # subnormal, infinite, NaN with a payload, -0
-    back = packing.unpack(packing.pack(uniform.Transition(31, 3, number, 31, 1), where), where)
+    back = packing.unpack(packing.pack(uniform.Transition(31, 3, number, 31, 1), layout), layout)
     assert np.asarray(back.reward).view(np.uint32) == bits

@@ -13,25 +13,33 @@ from hypothesis import strategies as st
 from significance import ALPHA, chi_square, same_law
 
 from jrcjax.replay import packing, sum_tree
-from jrcjax.replay import prioritised as memory_of
+from jrcjax.replay import prioritised as replay_of
 from jrcjax.replay.n_step import NStepTransition
 
 STATES, ACTIONS = 32, 4
+GAMMA = 0.75
 # A power, a logarithm and a sum of some hundred numbers >= 0, in float32.
 RTOL = 3e-6
 
-INIT = jax.jit(memory_of.init, static_argnums=1)
-ADD = jax.jit(memory_of.add, static_argnums=3)
-SAMPLE = jax.jit(memory_of.sample, static_argnums=2)
-SET = jax.jit(memory_of.set_priorities, static_argnums=4)
-WEIGHTS = jax.jit(memory_of.importance_weights)
+INIT = jax.jit(replay_of.init, static_argnums=1)
+ADD = jax.jit(replay_of.add, static_argnums=3)
+SAMPLE = jax.jit(partial(replay_of.sample, discount=jnp.float32(GAMMA)), static_argnums=2)
+SET = jax.jit(replay_of.set_priorities, static_argnums=4)
+WEIGHTS = jax.jit(replay_of.importance_weights)
 
 
 def numbered(i, xp=np) -> NStepTransition:
     """Transitions that tell their number by their reward, which is never 0 as in a row that was not written."""
     ids, number = (xp.asarray(i) * 7919 % 2**20).astype(xp.int32), xp.asarray(i).astype(xp.float32)
     return NStepTransition(
-        ids % STATES, ids % ACTIONS, number + 1, ids // 3 % STATES, ids % 2, -number, number / 8, ids // 5 % STATES
+        ids % STATES,
+        ids % ACTIONS,
+        number + 1,
+        ids // 3 % STATES,
+        (ids % 2).astype(xp.float32) * xp.float32(GAMMA),
+        -number,
+        number / 8,
+        ids // 5 % STATES,
     )
 
 
@@ -44,19 +52,19 @@ def number_of(transitions: NStepTransition) -> np.ndarray:
 
 
 def words_of(key: int, count: int) -> jax.Array:
-    return jax.random.bits(jax.random.key(key), (memory_of.NUM_WORDS, count), jnp.uint32)
+    return jax.random.bits(jax.random.key(key), (replay_of.NUM_WORDS, count), jnp.uint32)
 
 
 @partial(jax.jit, static_argnums=1)
-def everything(memory: memory_of.Memory, where: memory_of.Layout):
+def everything(replay: replay_of.Replay, layout: replay_of.Layout):
     """All leaves and all rows as transitions."""
-    values = sum_tree.leaves(memory.tree, jnp.arange(where.tree.leaves))
-    return values, packing.unpack(memory.rows, where.rows)
+    values = sum_tree.leaves(replay.tree, jnp.arange(layout.tree.leaves), layout.tree)
+    return values, packing.unpack(replay.rows, layout.rows, GAMMA)
 
 
-def held(memory: memory_of.Memory, where: memory_of.Layout) -> dict[int, float]:
+def held(replay: replay_of.Replay, layout: replay_of.Layout) -> dict[int, float]:
     """p^alpha by number of what can be sampled."""
-    values, transitions = jax.device_get(everything(memory, where))
+    values, transitions = jax.device_get(everything(replay, layout))
     there = values > 0
     numbers = number_of(jax.tree.map(lambda field: field[there], transitions))
     assert len(set(numbers)) == len(numbers)
@@ -64,7 +72,7 @@ def held(memory: memory_of.Memory, where: memory_of.Layout) -> dict[int, float]:
 
 
 class Naive:
-    """The memory as a list that stays, a queue that forgets, and a dictionary; numbers stand for transitions."""
+    """The replay as a list that stays, a queue that forgets, and a dictionary; numbers stand for transitions."""
 
     def __init__(self, demonstrations: int, capacity: int):
         self.demonstrations = list(range(demonstrations))
@@ -87,13 +95,13 @@ class Naive:
         return self.scaled[number] / sum(self.held().values())
 
 
-def assert_same(memory, where, naive: Naive, count: int) -> None:
-    got, wanted = held(memory, where), naive.held()
+def assert_same(replay, layout, naive: Naive, count: int) -> None:
+    got, wanted = held(replay, layout), naive.held()
     assert got.keys() == wanted.keys()
     numbers = sorted(wanted)
     np.testing.assert_allclose([got[n] for n in numbers], [wanted[n] for n in numbers], rtol=RTOL)
-    np.testing.assert_allclose(float(memory.largest), naive.largest, rtol=RTOL)
-    assert int(memory_of.size(jnp.int32(count), where)) == len(wanted)
+    np.testing.assert_allclose(float(replay.largest), naive.largest, rtol=RTOL)
+    assert int(replay_of.size(jnp.int32(count), layout)) == len(wanted)
 
 
 @settings(max_examples=25, deadline=None, derandomize=True)
@@ -103,86 +111,86 @@ def assert_same(memory, where, naive: Naive, count: int) -> None:
     st.integers(1, 4),
     st.lists(st.tuples(st.booleans(), st.integers(0, 2**31 - 1)), max_size=40),
 )
-def test_memory_against_a_list_and_a_queue(sizes, alpha, late, operations):
+def test_replay_against_a_list_and_a_queue(sizes, alpha, late, operations):
     demonstrations, capacity = sizes
-    where, naive = memory_of.layout(STATES, ACTIONS, capacity, demonstrations), Naive(demonstrations, capacity)
-    memory = INIT(numbered(np.arange(demonstrations)), where)
-    assert_same(memory, where, naive, 0)
+    layout, naive = replay_of.layout_of(STATES, ACTIONS, capacity, demonstrations), Naive(demonstrations, capacity)
+    replay = INIT(numbered(np.arange(demonstrations)), layout)
+    assert_same(replay, layout, naive, 0)
     added = 0
     for slot, (learns, seed) in enumerate(operations):
         # As in training, nothing is complete in the first slots, and what is written then means nothing.
         count = slot + 1 - late
-        memory = ADD(memory, numbered(demonstrations + count if count >= 0 else 10**6), jnp.int32(count), where)
+        replay = ADD(replay, numbered(demonstrations + count if count >= 0 else 10**6), jnp.int32(count), layout)
         if count >= 0:
             naive.add(demonstrations + count)
             added = count + 1
         if learns:
-            batch = SAMPLE(memory, words_of(seed, 4), where)
+            batch = SAMPLE(replay, words_of(seed, 4), layout)
             numbers = number_of(batch.transitions)
             assert batch.is_demonstration.tolist() == [n < demonstrations for n in numbers]
             np.testing.assert_allclose(batch.probability, [naive.probability(n) for n in numbers], rtol=RTOL)
             # Over six decades; what is sampled twice gets the same one.
             priorities = np.float32(10.0 ** ((numbers * 2654435761 + seed) % 7 - 3.0))
-            memory = SET(memory, batch.indices, jnp.asarray(priorities), jnp.float32(alpha), where)
+            replay = SET(replay, batch.indices, jnp.asarray(priorities), jnp.float32(alpha), layout)
             for number, priority in zip(numbers.tolist(), priorities.tolist(), strict=True):
                 naive.set_priority(number, priority, alpha)
-        assert_same(memory, where, naive, added)
+        assert_same(replay, layout, naive, added)
 
 
 @partial(jax.jit, static_argnums=1)
-def add_all(memory, where, counts):
-    def one(memory, count):
-        return memory_of.add(memory, numbered(where.demonstrations + count, jnp), count, where), None
+def add_all(replay, layout, counts):
+    def one(replay, count):
+        return replay_of.add(replay, numbered(layout.demonstrations + count, jnp), count, layout), None
 
-    return jax.lax.scan(one, memory, counts)[0]
+    return jax.lax.scan(one, replay, counts)[0]
 
 
 @pytest.mark.parametrize("added", [12_345, 30_000, 75_000])
-def test_the_papers_memory_keeps_the_demonstrations_and_the_newest_of_the_rest(added):
+def test_the_papers_replay_keeps_the_demonstrations_and_the_newest_of_the_rest(added):
     demonstrations, capacity, late = 20_000, 50_000, 9
-    where = memory_of.layout(STATES, ACTIONS, capacity, demonstrations)
+    layout = replay_of.layout_of(STATES, ACTIONS, capacity, demonstrations)
     counts = jnp.arange(-late, 75_000)
     # One length for all, so that one compiled program serves; the last ones are repeated.
-    memory = add_all(INIT(numbered(np.arange(demonstrations)), where), where, jnp.minimum(counts, added - 1))
+    replay = add_all(INIT(numbered(np.arange(demonstrations)), layout), layout, jnp.minimum(counts, added - 1))
     newest = range(demonstrations + max(added - 30_000, 0), demonstrations + added)
-    assert held(memory, where) == dict.fromkeys([*range(demonstrations), *newest], 1.0)
-    first = jax.tree.map(lambda field: field[:demonstrations], everything(memory, where)[1])
+    assert held(replay, layout) == dict.fromkeys([*range(demonstrations), *newest], 1.0)
+    first = jax.tree.map(lambda field: field[:demonstrations], everything(replay, layout)[1])
     assert number_of(first).tolist() == list(range(demonstrations))
-    assert float(sum_tree.total(memory.tree, where.tree)) == demonstrations + len(newest)
-    assert int(memory_of.size(jnp.int32(added), where)) == demonstrations + len(newest)
+    assert float(sum_tree.total(replay.tree, layout.tree)) == demonstrations + len(newest)
+    assert int(replay_of.size(jnp.int32(added), layout)) == demonstrations + len(newest)
 
 
 def test_before_the_first_new_transition_only_demonstrations_are_sampled():
-    where = memory_of.layout(STATES, ACTIONS, 40, 16)  # the next leaf begins a node
-    memory = INIT(numbered(np.arange(16)), where)
+    layout = replay_of.layout_of(STATES, ACTIONS, 40, 16)  # the next leaf begins a node
+    replay = INIT(numbered(np.arange(16)), layout)
     for count in range(-5, 0):
-        memory = ADD(memory, numbered(10**6), jnp.int32(count), where)
-        assert float(sum_tree.total(memory.tree, where.tree)) == 16.0
+        replay = ADD(replay, numbered(10**6), jnp.int32(count), layout)
+        assert float(sum_tree.total(replay.tree, layout.tree)) == 16.0
     edges = jnp.asarray([[0, 0, 2**32 - 1, 2**32 - 1], [0, 2**32 - 1, 0, 2**32 - 1]], jnp.uint32)
-    batch = SAMPLE(memory, jnp.concatenate([edges, words_of(0, 5000)], axis=1), where)
+    batch = SAMPLE(replay, jnp.concatenate([edges, words_of(0, 5000)], axis=1), layout)
     assert set(number_of(batch.transitions)) == set(range(16))
     assert batch.is_demonstration.all()
-    batch = SAMPLE(ADD(memory, numbered(16), jnp.int32(0), where), words_of(0, 5000), where)
+    batch = SAMPLE(ADD(replay, numbered(16), jnp.int32(0), layout), words_of(0, 5000), layout)
     assert set(number_of(batch.transitions)) == set(range(17))
 
 
 def test_new_transitions_get_the_largest_priority_so_far_even_after_it_is_gone():
-    where = memory_of.layout(STATES, ACTIONS, 6, 3)
-    memory = INIT(numbered(np.arange(3)), where)
-    memory = SET(memory, jnp.asarray([1, 2]), jnp.asarray([16.0, 0.25]), jnp.float32(0.5), where)
-    memory = SET(memory, jnp.asarray([1]), jnp.asarray([4.0]), jnp.float32(0.5), where)
-    memory = ADD(memory, numbered(3), jnp.int32(0), where)
-    assert held(memory, where) == pytest.approx({0: 1.0, 1: 2.0, 2: 0.5, 3: 4.0}, rel=RTOL)
+    layout = replay_of.layout_of(STATES, ACTIONS, 6, 3)
+    replay = INIT(numbered(np.arange(3)), layout)
+    replay = SET(replay, jnp.asarray([1, 2]), jnp.asarray([16.0, 0.25]), jnp.float32(0.5), layout)
+    replay = SET(replay, jnp.asarray([1]), jnp.asarray([4.0]), jnp.float32(0.5), layout)
+    replay = ADD(replay, numbered(3), jnp.int32(0), layout)
+    assert held(replay, layout) == pytest.approx({0: 1.0, 1: 2.0, 2: 0.5, 3: 4.0}, rel=RTOL)
 
 
 def filled(priorities: np.ndarray, alpha: float, capacity: int, demonstrations: int):
-    """A memory that holds transition i with priority i, and its layout."""
-    where = memory_of.layout(STATES, ACTIONS, capacity, demonstrations)
-    memory = INIT(numbered(np.arange(demonstrations)), where)
+    """A replay that holds transition i with priority i, and its layout."""
+    layout = replay_of.layout_of(STATES, ACTIONS, capacity, demonstrations)
+    replay = INIT(numbered(np.arange(demonstrations)), layout)
     for i in range(demonstrations, len(priorities)):
-        memory = ADD(memory, numbered(i), jnp.int32(i - demonstrations), where)
+        replay = ADD(replay, numbered(i), jnp.int32(i - demonstrations), layout)
     indices = jnp.arange(len(priorities))
-    return SET(memory, indices, jnp.asarray(priorities, jnp.float32), jnp.float32(alpha), where), where
+    return SET(replay, indices, jnp.asarray(priorities, jnp.float32), jnp.float32(alpha), layout), layout
 
 
 def some_priorities(count: int, seed: int = 0) -> np.ndarray:
@@ -192,9 +200,9 @@ def some_priorities(count: int, seed: int = 0) -> np.ndarray:
 @pytest.mark.parametrize("alpha", [0.0, 0.4, 1.0])
 def test_equation_23(alpha):
     priorities = some_priorities(70)
-    memory, where = filled(priorities, alpha, 100, 30)
+    replay, layout = filled(priorities, alpha, 100, 30)
     wanted = priorities**alpha / (priorities**alpha).sum()
-    batch = SAMPLE(memory, words_of(5, 200_000), where)
+    batch = SAMPLE(replay, words_of(5, 200_000), layout)
     numbers = number_of(batch.transitions)
     np.testing.assert_allclose(batch.probability, wanted[numbers], rtol=RTOL)
     assert (batch.is_demonstration == (numbers < 30)).all()
@@ -223,11 +231,11 @@ def test_importance_weights_at_the_ends_of_beta():
 
 
 def test_full_weights_undo_the_priorities():
-    # With beta = 1 the weighted mean over samples estimates the plain mean over the memory.
+    # With beta = 1 the weighted mean over samples estimates the plain mean over the replay.
     priorities = some_priorities(70) ** (1 / 3)  # from 0.1 to 10
-    memory, where = filled(priorities, 0.4, 100, 30)
-    batch = SAMPLE(memory, words_of(6, 200_000), where)
-    size = memory_of.size(jnp.int32(40), where)
+    replay, layout = filled(priorities, 0.4, 100, 30)
+    batch = SAMPLE(replay, words_of(6, 200_000), layout)
+    size = replay_of.size(jnp.int32(40), layout)
     weights = np.asarray(WEIGHTS(batch.probability, size, jnp.float32(1.0)), np.float64)
     numbers = number_of(batch.transitions)
     shares = np.bincount(numbers, weights, minlength=70) / weights.sum()
@@ -238,22 +246,24 @@ def test_full_weights_undo_the_priorities():
 @pytest.mark.parametrize("td_error", [-2.5, 0.0, 2.5])
 def test_priority_of_a_td_error(td_error):
     both = jnp.asarray([False, True])
-    got = memory_of.priority(jnp.full(2, td_error), both, jnp.float32(0.001), jnp.float32(1.0))
+    got = replay_of.priority(jnp.full(2, td_error), both, jnp.float32(0.001), jnp.float32(1.0))
     np.testing.assert_allclose(got, [abs(td_error) + 0.001, abs(td_error) + 1.0], rtol=1e-6)
 
 
 def test_priority_of_a_batch():
     td_error, is_demonstration = jnp.asarray([-1.0, 2.0, -3.0]), jnp.asarray([True, False, False])
-    got = memory_of.priority(td_error, is_demonstration, jnp.float32(0.5), jnp.float32(0.25))
-    assert got.tolist() == [1.25, 2.5, 3.5]
+    got = replay_of.priority(td_error, is_demonstration, jnp.float32(0.5), jnp.float32(0.75))
+    assert got.tolist() == [1.75, 2.5, 3.5]
+    smaller = replay_of.priority(td_error, is_demonstration, jnp.float32(0.5), jnp.float32(0.0))
+    assert smaller.tolist() == [1.5, 2.5, 3.5]  # no demonstration has less than its own error and the constant
 
 
 @pytest.mark.parametrize("alpha", [0.0, 0.4, 1.0])
 def test_against_flashbax(alpha):
     capacity, count, draws = 100, 70, 50_000
     priorities = some_priorities(count, seed=1)
-    memory, where = filled(priorities, alpha, capacity, 30)
-    ours = SAMPLE(memory, words_of(7, draws), where)
+    replay, layout = filled(priorities, alpha, capacity, 30)
+    ours = SAMPLE(replay, words_of(7, draws), layout)
 
     # One draw a call: in one call flashbax draws one from each of as many equal parts of the total.
     buffer = fbx.make_prioritised_item_buffer(capacity, 1, 1, add_sequences=True, priority_exponent=alpha)

@@ -12,7 +12,7 @@ from significance import ALPHA, chi_square
 
 from jrcjax.replay import sum_tree
 
-RADIX = sum_tree.RADIX
+RADIX = 4  # children per node
 # Below, at and above every size at which a level or a node begins.
 SIZES = [1, 2, 3, 4, 5, 64, 65, 256, 257, 1024, 1025, 4096, 4097, 16_384, 16_385, 50_000]
 # A sum of RADIX numbers >= 0, in any order.
@@ -29,13 +29,13 @@ def f32(values) -> jax.Array:
     return jnp.asarray(values, jnp.float32)
 
 
-def assert_stands_for(tree, where, leaves: np.ndarray, rtol: float) -> None:
+def assert_stands_for(tree, layout, leaves: np.ndarray, rtol: float) -> None:
     """The tree has these leaves, and every node is the sum of its children, up to the few nodes of the top."""
-    assert tree.shape == (where.nodes, RADIX)
-    assert where.first_node[0] == 0
+    assert tree.shape == (layout.rows, RADIX)
+    assert layout.first_row[0] == 0
     rows, children = np.asarray(tree, np.float64), leaves.astype(np.float32).astype(np.float64)
-    np.testing.assert_array_equal(rows.ravel()[: where.leaves], children)
-    for first, end in zip(where.first_node, [*where.first_node[1:], where.nodes], strict=True):
+    np.testing.assert_array_equal(rows.ravel()[: layout.leaves], children)
+    for first, end in zip(layout.first_row, [*layout.first_row[1:], layout.rows], strict=True):
         stored = rows[first:end].ravel()
         np.testing.assert_allclose(stored[: len(children)], children, rtol=rtol)
         assert not stored[len(children) :].any()  # what fills the last row
@@ -45,39 +45,39 @@ def assert_stands_for(tree, where, leaves: np.ndarray, rtol: float) -> None:
 
 
 @partial(jax.jit, static_argnums=0)
-def everything(where, values, batches, single):
+def everything(layout, values, batches, single):
     """Trees, leaves and totals: at first, after each batch, and after the single update that follows it."""
 
     def look(tree):
-        return tree, sum_tree.leaves(tree, jnp.arange(where.leaves)), sum_tree.total(tree, where)
+        return tree, sum_tree.leaves(tree, jnp.arange(layout.leaves), layout), sum_tree.total(tree, layout)
 
     def one_round(tree, operations):
         (indices, new), (index, value) = operations
-        between = sum_tree.update(tree, indices, new, where)
-        after = sum_tree.update_one(between, index, value, where)
+        between = sum_tree.update(tree, indices, new, layout)
+        after = sum_tree.update_one(between, index, value, layout)
         return after, (look(between), look(after))
 
-    start = sum_tree.init(values, where)
+    start = sum_tree.init(values, layout)
     return look(start), jax.lax.scan(one_round, start, (batches, single))[1]
 
 
 def drive(leaves: int, rng: np.random.Generator, values, rtol: float, rounds: int = 6) -> None:
     """The same random operations on a tree and on an array."""
-    where = sum_tree.layout(leaves)
+    layout = sum_tree.layout_of(leaves)
     twin = values(leaves)
     # Half of a batch is crowded into a few leaves, so that there are duplicates, also with many leaves.
     shape = (rounds, 16)
     few = rng.integers(0, leaves, 3)
     indices = np.where(rng.random(shape) < 0.5, rng.choice(few, shape), rng.integers(0, leaves, shape))
     new, index, value = values(shape), rng.integers(0, leaves, rounds), values(rounds)
-    start, later = everything(where, f32(twin), (jnp.asarray(indices), f32(new)), (jnp.asarray(index), f32(value)))
+    start, later = everything(layout, f32(twin), (jnp.asarray(indices), f32(new)), (jnp.asarray(index), f32(value)))
 
     def check(seen):
         tree, got, total = seen
         np.testing.assert_array_equal(got, f32(twin))
-        assert_stands_for(tree, where, twin, rtol)
+        assert_stands_for(tree, layout, twin, rtol)
         # Over the levels below the top, and the top's at most 16 rows.
-        np.testing.assert_allclose(float(total), twin.sum(), rtol=(len(where.first_node) + 16) * rtol)
+        np.testing.assert_allclose(float(total), twin.sum(), rtol=(len(layout.first_row) + 16) * rtol)
 
     check(start)
     for k in range(rounds):
@@ -105,89 +105,89 @@ def test_tree_against_an_array(leaves, seed):
 
 
 def test_small_leaves_come_back_after_a_large_one():
-    where = sum_tree.layout(300)
-    before = INIT(jnp.full(300, 0.1), where)
-    for update in (lambda t, x: UPDATE(t, jnp.asarray([123]), f32([x]), where),
-                   lambda t, x: UPDATE_ONE(t, jnp.asarray(123), f32(x), where)):  # fmt: skip
+    layout = sum_tree.layout_of(300)
+    before = INIT(jnp.full(300, 0.1), layout)
+    for update in (lambda t, x: UPDATE(t, jnp.asarray([123]), f32([x]), layout),
+                   lambda t, x: UPDATE_ONE(t, jnp.asarray(123), f32(x), layout)):  # fmt: skip
         after = update(update(before, 1e12), 0.1)
         np.testing.assert_allclose(after, before, rtol=RTOL)
 
 
 def test_no_drift_in_a_million_updates():
-    where = sum_tree.layout(50_000)
+    layout = sum_tree.layout_of(50_000)
 
     def one(tree, key):
         of_index, of_value = jax.random.split(key)
-        indices = jax.random.randint(of_index, (64,), 0, where.leaves)
+        indices = jax.random.randint(of_index, (64,), 0, layout.leaves)
         values = 10.0 ** jax.random.uniform(of_value, (64,), minval=-3.0, maxval=3.0)
-        return sum_tree.update(tree, indices, values, where), None
+        return sum_tree.update(tree, indices, values, layout), None
 
     keys = jax.random.split(jax.random.key(0), 16_000)
-    tree = jax.jit(lambda tree: jax.lax.scan(one, tree, keys)[0])(INIT(jnp.ones(where.leaves), where))
-    leaves = np.asarray(sum_tree.leaves(tree, jnp.arange(where.leaves)))
+    tree = jax.jit(lambda tree: jax.lax.scan(one, tree, keys)[0])(INIT(jnp.ones(layout.leaves), layout))
+    leaves = np.asarray(sum_tree.leaves(tree, jnp.arange(layout.leaves), layout))
     assert (leaves != 1.0).all()  # each was updated; 20 times on average
-    np.testing.assert_allclose(float(sum_tree.total(tree, where)), leaves.astype(np.float64).sum(), rtol=1e-6)
-    assert_stands_for(tree, where, leaves, RTOL)
+    np.testing.assert_allclose(float(sum_tree.total(tree, layout)), leaves.astype(np.float64).sum(), rtol=1e-6)
+    assert_stands_for(tree, layout, leaves, RTOL)
 
 
 @pytest.mark.parametrize("leaves", [5, 200, 700])
 def test_update_of_one_leaf_of_many_trees(leaves):
-    where = sum_tree.layout(leaves)
+    layout = sum_tree.layout_of(leaves)
     rng = np.random.default_rng(leaves)
-    trees = jax.vmap(lambda values: sum_tree.init(values, where))(f32(rng.integers(0, 256, (3, leaves))))
+    trees = jax.vmap(lambda values: sum_tree.init(values, layout))(f32(rng.integers(0, 256, (3, leaves))))
     index, values = jnp.int32(leaves - 2), f32([7.0, 0.0, 9.0])
-    got = jax.jit(jax.vmap(lambda tree, i, x: sum_tree.update_one(tree, i, x, where), (0, None, 0)))(
+    got = jax.jit(jax.vmap(lambda tree, i, x: sum_tree.update_one(tree, i, x, layout), (0, None, 0)))(
         trees, index, values
     )
-    wanted = jax.vmap(lambda tree, x: sum_tree.update(tree, index[None], x[None], where))(trees, values)
+    wanted = jax.vmap(lambda tree, x: sum_tree.update(tree, index[None], x[None], layout))(trees, values)
     np.testing.assert_array_equal(got, wanted)
 
 
-def draws(tree, where, count: int, seed: int) -> np.ndarray:
+def draws(tree, layout, count: int, seed: int) -> np.ndarray:
     """How often each leaf was drawn; what comes with an index must be the leaf's value."""
     words = jax.random.bits(jax.random.key(seed), (sum_tree.NUM_WORDS, count), jnp.uint32)
-    indices, values = SAMPLE(tree, words, where)
+    indices, values = SAMPLE(tree, words, layout)
     assert indices.shape == values.shape == (count,)
     assert indices.min() >= 0
-    assert indices.max() < where.leaves
-    np.testing.assert_array_equal(values, sum_tree.leaves(tree, indices))
-    return np.bincount(indices, minlength=where.leaves)
+    assert indices.max() < layout.leaves
+    np.testing.assert_array_equal(values, sum_tree.leaves(tree, indices, layout))
+    return np.bincount(indices, minlength=layout.leaves)
 
 
 @pytest.mark.parametrize(("leaves", "filled"), [(3, 3), (4, 4), (17, 17), (64, 40), (65, 65), (2000, 1100)])
 def test_leaves_are_drawn_in_proportion_to_their_values(leaves, filled):
-    where = sum_tree.layout(leaves)
+    layout = sum_tree.layout_of(leaves)
     values = np.zeros(leaves)
     values[:filled] = 10.0 ** np.random.default_rng(leaves).uniform(-3, 3, filled)
-    counts = draws(INIT(f32(values), where), where, 400_000, leaves)
+    counts = draws(INIT(f32(values), layout), layout, 400_000, leaves)
     assert chi_square(counts, values / values.sum()) > ALPHA
 
 
 def test_leaves_of_the_papers_memory_are_drawn_in_proportion_to_their_values():
-    where = sum_tree.layout(50_000)
-    values = 10.0 ** np.random.default_rng(1).uniform(-3, 3, where.leaves)
-    tree = INIT(f32(values), where)
-    counts = draws(tree, where, 1_000_000, 1)
+    layout = sum_tree.layout_of(50_000)
+    values = 10.0 ** np.random.default_rng(1).uniform(-3, 3, layout.leaves)
+    tree = INIT(f32(values), layout)
+    counts = draws(tree, layout, 1_000_000, 1)
     # By neighbourhood, and by size: equal neighbours could hide a mistake in either.
-    for order in (np.arange(where.leaves), values.argsort()):
+    for order in (np.arange(layout.leaves), values.argsort()):
         bins = lambda x: x[order].reshape(500, 100).sum(axis=1)  # noqa: B023, E731
         assert chi_square(bins(counts), bins(values / values.sum())) > ALPHA
     # Within neighbourhoods, since one word chooses those and another the leaf: position among 1024.
-    position = np.arange(where.leaves) % RADIX ** (len(where.first_node) - 1)
+    position = np.arange(layout.leaves) % RADIX ** (len(layout.first_row) - 1)
     assert chi_square(np.bincount(position, counts), np.bincount(position, values / values.sum())) > ALPHA
 
 
 def test_equal_leaves_are_drawn_uniformly_down_to_the_leaf():
-    where = sum_tree.layout(50_000)
-    counts = draws(INIT(jnp.ones(where.leaves), where), where, 500_000, 2)
-    assert chi_square(counts, np.full(where.leaves, 1 / where.leaves)) > ALPHA
+    layout = sum_tree.layout_of(50_000)
+    counts = draws(INIT(jnp.ones(layout.leaves), layout), layout, 500_000, 2)
+    assert chi_square(counts, np.full(layout.leaves, 1 / layout.leaves)) > ALPHA
 
 
 def test_draws_do_not_depend_on_each_other():
-    where = sum_tree.layout(4)
+    layout = sum_tree.layout_of(4)
     words = jax.random.bits(jax.random.key(3), (sum_tree.NUM_WORDS, 200_000), jnp.uint32)
     values = np.array([1.0, 2.0, 3.0, 4.0])
-    indices = np.asarray(SAMPLE(INIT(f32(values), where), words, where)[0]).reshape(-1, 2)
+    indices = np.asarray(SAMPLE(INIT(f32(values), layout), words, layout)[0]).reshape(-1, 2)
     pairs = np.bincount(indices[:, 0] * 4 + indices[:, 1], minlength=16)
     assert chi_square(pairs, np.outer(values, values).ravel() / 100.0) > ALPHA
 
@@ -197,15 +197,15 @@ EDGE_WORDS = [0, 1, 255, 256, 2**31 - 1, 2**31, LARGEST_WORD - 256, LARGEST_WORD
 
 @pytest.mark.parametrize("filled", [1, 2, 3, 4, 5, 15, 16, 17, 63, 64, 65, 255, 256, 257, 4095, 4096, 4097, 5000])
 def test_zero_leaves_are_never_drawn(filled):
-    where = sum_tree.layout(5000)
+    layout = sum_tree.layout_of(5000)
     edges = np.array(np.meshgrid(EDGE_WORDS, EDGE_WORDS)).reshape(2, -1)
     random = jax.random.bits(jax.random.key(4), (sum_tree.NUM_WORDS, 4000), jnp.uint32)
     words = jnp.concatenate([jnp.asarray(edges, jnp.uint32), random], axis=1)
     for seed in range(8):  # sums are rounded in another way each time
-        values = np.zeros(where.leaves)
+        values = np.zeros(layout.leaves)
         values[:filled] = 10.0 ** np.random.default_rng(seed).uniform(-3, 3, filled)
-        tree = INIT(f32(values), where)
-        indices, drawn = SAMPLE(tree, words, where)
+        tree = INIT(f32(values), layout)
+        indices, drawn = SAMPLE(tree, words, layout)
         assert indices.min() >= 0
         assert indices.max() < filled
         assert (drawn > 0).all()
@@ -215,7 +215,7 @@ def test_zero_leaves_are_never_drawn(filled):
 
 @pytest.mark.parametrize("filled", [1, 2, 3, 4, 5, 63, 64, 65, 256, 257, 4096, 4097, 5000])
 def test_first_and_last_leaf_are_reached(filled):
-    where = sum_tree.layout(5000)
+    layout = sum_tree.layout_of(5000)
     words = jnp.asarray([[0, LARGEST_WORD]] * sum_tree.NUM_WORDS, jnp.uint32)
-    indices, _ = SAMPLE(INIT(f32(np.arange(where.leaves) < filled), where), words, where)
+    indices, _ = SAMPLE(INIT(f32(np.arange(layout.leaves) < filled), layout), words, layout)
     assert indices.tolist() == [0, filled - 1]

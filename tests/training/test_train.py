@@ -294,7 +294,7 @@ def recorder(slots: int):
     def factory(spec, config) -> Learner:
         base = LEARNERS["q_learning"](spec, config)
         integers = jnp.zeros(slots, jnp.int32)
-        empty = Transition(integers, integers, jnp.zeros(slots), integers, integers)
+        empty = Transition(integers, integers, jnp.zeros(slots), integers, jnp.zeros(slots))
         return Learner(
             num_words=2,
             init=lambda key, hparams, source: empty,
@@ -314,9 +314,10 @@ def test_time_limit_ends_the_problem_only_if_asked_and_only_in_the_last_slot(par
         train(jax.random.key(0), params.replace(terminal_time_limit=jnp.int32(limit)), hparams_of()) for limit in (0, 1)
     ]
     truncated, ended = (state.learner for state, _ in runs)
-    assert not np.any(truncated.terminal)
-    np.testing.assert_array_equal(ended.terminal, ([0] * (SLOTS - 1) + [1]) * 3)
-    assert_same(truncated._replace(terminal=ended.terminal), ended)
+    gamma = np.float32(0.99)
+    np.testing.assert_array_equal(truncated.discount, [gamma] * 3 * SLOTS)
+    np.testing.assert_array_equal(ended.discount, ([gamma] * (SLOTS - 1) + [0.0]) * 3)
+    assert_same(truncated._replace(discount=ended.discount), ended)
     assert_same(runs[0][1], runs[1][1])
 
 

@@ -19,7 +19,7 @@ def random_demonstrations(spec: Spec, number: int, seed: int, scale: float = 1.0
         action=generator.integers(0, spec.num_actions, number),
         reward=generator.normal(0, scale, number).astype(np.float32).astype(float),
         next_state=generator.integers(0, states, number),
-        terminal=(n_terminal & (generator.uniform(size=number) < 0.5)).astype(int),
+        discount=np.where(n_terminal & (generator.uniform(size=number) < 0.5), 0.0, np.float32(0.9)),
         n_return=generator.normal(0, 2 * scale, number).astype(np.float32).astype(float),
         n_discount=np.where(n_terminal, 0.0, np.float32(0.9) ** generator.integers(1, 5, number)),
         n_state=generator.integers(0, states, number),

@@ -1,0 +1,96 @@
+"""The claims in many readings of the paper: in which share of the space each holds, and which readings decide it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from paper_figs.analysis.intervals import proportion_effect
+from paper_figs.analysis.sensitivity import LEAST_POINTS, sensitivity
+from paper_figs.claims.judge import Judgement, is_on_its_side
+from paper_figs.claims.table import claims_of
+from sweeps.studies.multiverse import POINTS
+from sweeps.studies.readings import READINGS, unit_of, values_at
+
+FIGURES = ("fig5b", "fig6", "fig7", "fig8", "fig9")
+VERDICTS = ("supported", "contradicted", "undecided")
+
+
+def claims_in(source: xr.Dataset, target: xr.Dataset) -> list[Judgement]:
+    """All claims in one reading.
+
+    Args:
+      source: results in its source environment, one point.
+      target: results at its POINTS.
+    """
+    figures = {name: [i for i, point in enumerate(POINTS) if name in point.figures] for name in FIGURES}
+    return claims_of({"fig5a": source} | {name: target.isel(point=points) for name, points in figures.items()})
+
+
+def of_readings(source: xr.Dataset, target: xr.Dataset) -> Iterator[tuple[int, list[Judgement]]]:
+    """The claims in each reading of a block, from the results of its sweep and of its source agents."""
+    for place, number in enumerate(source["reading"].values.astype(int)):
+        points = np.flatnonzero(target["reading"].values == number)
+        yield int(number), claims_in(source.isel(point=[place]), target.isel(point=points))
+
+
+def verdicts(judged: list[tuple[int, list[Judgement]]]) -> pd.DataFrame:
+    """One row per reading and claim: the effect with its interval, and the verdict.
+
+    A claim `holds` if its estimate, whatever its interval, is on the claim's side.
+    """
+    rows = [
+        {
+            "reading": number,
+            "claim": c.claim,
+            "value": c.value,
+            "ci_low": c.ci_low,
+            "ci_high": c.ci_high,
+            "verdict": c.verdict,
+            "holds": is_on_its_side(c.value, c.relation, c.limit),
+            "negligible": c.negligible,
+            "n_seeds": c.n_seeds,
+        }
+        for number, of_reading in judged
+        for c in of_reading
+    ]
+    return pd.DataFrame(rows)
+
+
+def shares(found: pd.DataFrame) -> pd.DataFrame:
+    """One row per claim: the share of readings with each verdict, and of those where it holds, with 95 % limits."""
+    rows = []
+    for claim, of_claim in found.groupby("claim", sort=False):
+        row: dict[str, object] = {"claim": claim, "readings": len(of_claim)}
+        counts = {verdict: (of_claim.verdict == verdict).sum() for verdict in VERDICTS}
+        counts |= {"negligible": (of_claim.negligible == True).sum(), "holds": of_claim.holds.astype(bool).sum()}  # noqa: E712
+        for name, count in counts.items():
+            share = proportion_effect(int(count), len(of_claim))
+            row |= {name: float(share.value), f"{name}_low": float(share.low), f"{name}_high": float(share.high)}
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def readings(numbers: list[int]) -> pd.DataFrame:
+    """What each reading is, by path; empty where it is as by default."""
+    return pd.DataFrame([{"reading": n} | values_at(unit_of(1, n)[0]) for n in numbers])
+
+
+def decisive(found: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """Sensitivity indices of each claim's effect over the readings, and interactions of its three strongest ones."""
+    tables: dict[str, list[pd.DataFrame]] = {"sensitivity": [], "interactions": []}
+    sampled = found.query("reading > 0")  # reading 0 is the default and no point of the sample
+    for claim, of_claim in sampled.groupby("claim", sort=False):
+        known = of_claim[np.isfinite(of_claim.value.to_numpy(float))]
+        if len(known) < LEAST_POINTS:
+            continue
+        unit = np.vstack([unit_of(1, int(number)) for number in known.reading])
+        inputs = pd.DataFrame(unit, columns=[reading.label for reading in READINGS])
+        indices = sensitivity(inputs, known.value.to_numpy(float))
+        about = {"claim": claim, "surrogate": indices.surrogate, "surrogate_error": indices.error}
+        tables["sensitivity"].append(indices.table.assign(**about))
+        tables["interactions"].append(indices.pairs.assign(claim=claim))
+    return {name: pd.concat(of) for name, of in tables.items() if of}

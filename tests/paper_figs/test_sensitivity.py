@@ -1,0 +1,44 @@
+"""Sensitivity indices on functions whose indices are known."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from paper_figs.analysis.sensitivity import sensitivity
+from sweeps.design import sobol
+
+
+def sample(number, noise, function):
+    unit = sobol(4, number, seed=1)
+    output = function(unit) + noise * np.random.default_rng(2).standard_normal(number)
+    return pd.DataFrame(unit, columns=list("abcd")), output
+
+
+def test_the_indices_of_a_linear_function_lie_in_their_intervals():
+    weights = np.array([3.0, 2.0, 1.0, 0.0])
+    found = sensitivity(*sample(96, 0.2, lambda unit: unit @ weights))
+    truth = weights**2 / (weights**2).sum()
+    for order in ("first", "total"):
+        table = found.table
+        assert (table[f"{order}_low"] <= truth + 1e-12).all()
+        assert (table[f"{order}_high"] >= truth - 1e-12).all()
+        assert ((table[f"{order}_high"] - table[f"{order}_low"]) < 0.3).all()
+    assert 0 < found.error < 0.2
+    assert (found.pairs.interaction_low <= 1e-12).all()
+
+
+def test_an_interaction_is_told_from_what_inputs_do_alone():
+    # The product of two centred inputs is all interaction.
+    found = sensitivity(*sample(128, 0.0, lambda unit: (unit[:, 0] - 0.5) * (unit[:, 1] - 0.5)))
+    first, total = found.table["first"], found.table["total"]
+    assert (first < 0.15).all()
+    assert (total[:2] > 0.7).all()
+    pair = found.pairs.query("input == 'a' and other == 'b'")
+    assert pair.interaction_low.item() > 0.5
+
+
+def test_what_never_changes_is_decided_by_nothing_and_few_points_by_no_one():
+    inputs, _ = sample(64, 0.0, lambda unit: unit[:, 0])
+    assert (sensitivity(inputs, np.ones(64)).table["total"] == 0).all()
+    with pytest.raises(ValueError, match="points: 8; allowed: at least 30"):
+        sensitivity(inputs[:8], np.arange(8.0))
