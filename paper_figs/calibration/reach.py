@@ -34,6 +34,7 @@ _RARE = "most studies hold too few of the rare runs to say how frequent they are
 _UNION = "where all points are equal, the limit that needs no correction is hardly ever wrong"
 _FEW = "with so few seeds hardly any point is surely off the edge, so the limit holds for all of them"
 _COUNT = "a count has few outcomes; the next narrower interval would be wrong too often"
+_ALIKE = "five runs that share their seeds make hardly any independent comparisons"
 _HEAVY = "Student's t is too wide for a few values with heavy tails"
 
 BEYOND: tuple[Beyond, ...] = (
@@ -54,6 +55,7 @@ BEYOND: tuple[Beyond, ...] = (
     Beyond("share of runs", "nine in ten", (5, 10), "coverage", _COUNT),
     Beyond("share of runs", "nine in ten", (30,), "errors", "a count's errors are 2.5 % on average over shares only"),
     Beyond("inter-quartile mean", "exponential", (5,), "errors", _TAIL),
+    Beyond("improvement", "learners that share seeds", (5,), "coverage", _ALIKE),
 )
 
 

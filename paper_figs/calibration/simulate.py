@@ -16,12 +16,13 @@ from paper_figs.claims.results import Rules
 
 _NUMBERS_AT_ONCE = 2_000_000
 _NUMBERS_IN_ALL = 120_000_000  # of one world with so many seeds
-_STUDIES = (20_000, 10_000)  # at most, of worlds with one number per seed and with several
+_STUDIES = {1: 20_000, 2: 4_000}  # at most, of worlds with so many numbers per seed
+_OF_POINTS = 10_000  # and of those with more
 
 
 def studies_of(world: World, n_seeds: int) -> int:
     """How many studies the published table has of a world."""
-    return min(_STUDIES[world.columns > 1], _NUMBERS_IN_ALL // (n_seeds * world.columns))
+    return min(_STUDIES.get(world.columns, _OF_POINTS), _NUMBERS_IN_ALL // (n_seeds * world.columns))
 
 
 class Rates(NamedTuple):
@@ -60,7 +61,7 @@ def rows(worlds: Iterable[World] = WORLDS, seeds: Iterable[int] = SEEDS, most: i
     """The table's rows, as they come; `most` studies each."""
     for world in worlds:
         for n in seeds:
-            studies = min(studies_of(world, n), most or _STUDIES[0])
+            studies = min(studies_of(world, n), most or _STUDIES[1])
             rates, missing = simulate(world, n, studies), beyond(world.rule, world.name, n)
             yield {
                 "rule": world.rule,

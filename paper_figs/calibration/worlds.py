@@ -207,9 +207,9 @@ def _descriptions() -> list[World]:
         World(
             "inter-quartile mean", "exponential", middle, lambda rng, n, b: (laws.exponential(rng, (n, b)),), _MIDDLE
         ),
-        World("improvement", "normal", improvement, _runs(laws.normal, 0.0), 0.5),
-        World("improvement", "lognormal", improvement, _runs(laws.lognormal, 0.0), 0.5),
-        World("improvement", "learners that share seeds", improvement, _runs(laws.normal, 1.0), 0.5),
+        World("improvement", "normal", improvement, _runs(laws.normal, 0.0), 0.5, columns=2),
+        World("improvement", "lognormal", improvement, _runs(laws.lognormal, 0.0), 0.5, columns=2),
+        World("improvement", "learners that share seeds", improvement, _runs(laws.normal, 1.0), 0.5, columns=2),
     ]
 
 
