@@ -122,7 +122,8 @@ def base_of(environment: str, preset: str) -> Base:
     if setting not in SOURCES:
         refuse("source", str(setting), ", ".join(SOURCES))
     if environment == "source" and setting == "table1":
-        own = {path: value for path, value in own.items() if path.startswith("env.")}
+        # n is shared in any case, since demonstrations come with their returns.
+        own = {path: value for path, value in own.items() if path.startswith("env.") or path == "config.n_step"}
     return with_set(base, own)
 
 

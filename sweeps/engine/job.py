@@ -103,10 +103,9 @@ class Job:
         points = f"{len(sweep.design)} points x {sweep.seeds_per_part} seeds x {len(sweep.learners)} learners"
         if agents > MOST_AGENTS:
             refuse("points", points, f"at most {MOST_AGENTS} agents at a time, not {agents}")
-        needed = _COPIES * sum(
-            count * agent_bytes(make_learner(name, self.spec, group.config), self.spec, group.config)
-            for count, group in zip(lanes, self.groups, strict=True)
-            for name in sweep.learners
+        needed = _COPIES * max(  # groups are run one after the other
+            count * sum(agent_bytes(make_learner(n, self.spec, g.config), self.spec, g.config) for n in sweep.learners)
+            for count, g in zip(lanes, self.groups, strict=True)
         )
         if needed > (available := physical_memory()):
             estimate = f"about {needed / 2**30:.3g} GiB for {agents} agents at a time"

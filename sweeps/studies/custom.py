@@ -22,7 +22,7 @@ from jrcjax.types import choice
 from sweeps import design
 from sweeps.design import Design
 from sweeps.preset import SOURCES, base_of, set_in
-from sweeps.studies.source import SOURCE, source_for
+from sweeps.studies.source import source_for
 from sweeps.sweep import Sweep
 
 CUSTOM = "custom"
@@ -187,7 +187,6 @@ def _with_source(sweep: Sweep, base: Points, preset: str, setting: str) -> Sweep
     if spec_of(base_of("source", preset).points.params)[:2] != spec_of(base.params)[:2]:
         allowed = f"learners without transfer, for levels {base.params.shape} and {base.params.num_actions} actions"
         refuse("learners", " ".join(needing), allowed)
-    if setting == "table1" or set_in(preset).get("source") == "table1":
-        return replace(sweep, source=SOURCE)
-    source, points = source_for(sweep)
+    of_table1 = "table1" in (setting, set_in(preset).get("source"))
+    source, points = source_for(sweep, of_table1)
     return replace(sweep, source=source, source_points=points)

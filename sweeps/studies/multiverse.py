@@ -19,6 +19,7 @@ from sweeps.studies.fig6 import FIG6
 from sweeps.studies.fig7 import FIG7
 from sweeps.studies.fig8 import FIG8
 from sweeps.studies.readings import READINGS, SOURCE, unit_of, values_at
+from sweeps.studies.source import ALWAYS_SHARED
 from sweeps.sweep import Size, Study, Sweep
 
 READINGS_PER_BLOCK = 16
@@ -102,9 +103,11 @@ def _target(values: Mapping[str, float]) -> dict[str, float]:
 
 
 def _source(values: Mapping[str, float]) -> dict[str, float]:
-    """What of a reading holds in the source: all, or only its environment if the source is Table I's."""
+    """What of a reading holds in the source: all, or its environment and n alone if the source is Table I's."""
     own = _target(values)
-    return {path: v for path, v in own.items() if path.startswith("env.")} if values.get(SOURCE) else own
+    if not values.get(SOURCE):
+        return own
+    return {path: value for path, value in own.items() if path.startswith("env.") or path in ALWAYS_SHARED}
 
 
 def sweeps_of(number: int, first: int = 0) -> tuple[Sweep, ...]:

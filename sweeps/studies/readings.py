@@ -46,7 +46,13 @@ READINGS: tuple[Reading, ...] = (
     Reading("hparams.learning_rate", "step size (SGD: a hundredth)", Range(1e-6, 1e-2, is_log=True)),
     Reading("config.optimiser", "optimiser"),
     Reading("hparams.epsilon_slots", "slots of exploration", Range(20.0 * _SLOTS, 600.0 * _SLOTS, is_log=True)),
+    Reading("hparams.exploration", "fall of epsilon"),
+    Reading("hparams.initialiser", "initialiser"),
+    Reading("hparams.loss", "loss"),
+    Reading("config.gradient_clipping", "clipping of gradients"),
+    Reading("config.target_update", "target network"),
     Reading("env.event_model", "events"),
+    Reading("env.reward_state", "state of the reward"),
     Reading("env.speed.event_probability.low", "p_0^v", _levels(0.005, 0.05)),
     Reading("env.count_event_packets", "packets with an event count", _levels(1.0, 0.0)),
     Reading("env.miss_convention", "miss detection on data"),
@@ -62,8 +68,10 @@ READINGS: tuple[Reading, ...] = (
     Reading("config.n_step", "n of returns", _levels(10.0, 1.0, 5.0, 20.0), "tlwd"),
     Reading("hparams.margin", "margin", Range(0.1, 100.0, is_log=True), "tlwd"),
     Reading("hparams.margin_weight", "weight of the margin", Range(0.1, 100.0, is_log=True), "tlwd"),
-    Reading("hparams.demonstration_constant", "demonstrations' priority", Range(0.001, 10.0), "tlwd"),
+    Reading("hparams.demonstration_constant", "demonstrations' priority", Range(0.0, 10.0), "tlwd"),
+    Reading("hparams.demonstration_rewards", "demonstrations' rewards", scope="tlwd"),
     Reading("hparams.importance_start", "first beta", Range(0.0, 1.0), "tlwd"),
+    Reading("hparams.importance_over", "updates that beta rises over", scope="tlwd"),
 )
 """All questions, and where their answers are searched."""
 

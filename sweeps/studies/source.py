@@ -21,8 +21,10 @@ _NOT_THE_SOURCES = frozenset(
         "hparams.priority_exponent",
         "hparams.priority_constant",
         "hparams.demonstration_constant",
+        "hparams.demonstration_rewards",
         "hparams.importance_start",
         "hparams.importance_end",
+        "hparams.importance_over",
         "hparams.n_step_weight",
         "hparams.margin_weight",
         "hparams.l2_weight",
@@ -34,20 +36,30 @@ _NOT_THE_SOURCES = frozenset(
 """What only Q-learning or TLwD reads, so that Double DQN's source agents are the same whatever it is."""
 
 
-def source_for(sweep: Sweep) -> tuple[Sweep, tuple[int, ...]]:
-    """What trains the source agents of a sweep with the hyperparameters and settings of its points.
+ALWAYS_SHARED = ("config.n_step",)
+"""What source agents have in common with the learners in any case: demonstrations come with their returns."""
+
+
+def source_for(sweep: Sweep, of_table1: bool = False) -> tuple[Sweep, tuple[int, ...]]:
+    """What trains the source agents of a sweep.
+
+    Args:
+      sweep: whose points' hyperparameters and settings they have.
+      of_table1: let them have Table I's instead, but for what is `ALWAYS_SHARED`.
 
     Returns:
       The source's sweep, `SOURCE` where nothing differs from Table I, and the number of its point for each point.
     """
-    names = [column.name for column in sweep.design.columns if _is_the_sources(column.path)]
+    names = [column.name for column in sweep.design.columns if _is_the_sources(column.path, of_table1)]
     design, points = sweep.design.distinct(names)
-    fixed = tuple((path, value) for path, value in sweep.fixed if _is_the_sources(path))
+    fixed = tuple((path, value) for path, value in sweep.fixed if _is_the_sources(path, of_table1))
     if not design.columns and not fixed:
         return SOURCE, ()
     name = f"{sweep.name}-source"
     return replace(SOURCE, name=name, design=design, fixed=fixed, own=True, seeds_per_part=sweep.seeds_per_part), points
 
 
-def _is_the_sources(path: str) -> bool:
+def _is_the_sources(path: str, of_table1: bool) -> bool:
+    if of_table1:
+        return path in ALWAYS_SHARED
     return path.startswith(("hparams.", "config.")) and path not in _NOT_THE_SOURCES

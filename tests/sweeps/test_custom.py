@@ -78,6 +78,9 @@ def test_several_parameters_give_the_grid_and_settings_their_programs():
     assert sweep.source_points == (0, 1, 2, 3)
     of_table1 = custom_sweep(Options(vary=(f"{rate}=1e-4,1e-3",), learners=("dpr",), source="table1"), "paper")
     assert of_table1.source is SOURCE
+    # Demonstrations come with their n-step returns, so n is the learners' in any case.
+    of_n = custom_sweep(Options(vary=("config.n_step=1,5",), learners=("tlwd",), source="table1"), "paper")
+    assert [g.config.n_step for g in Job(of_n.source, SMOKE).groups] == [1, 5]
     # What the source's learner does not read needs no source agents of its own.
     assert custom_sweep(Options(vary=("hparams.margin=1,2",), learners=("tlwd",)), "paper").source is SOURCE
     both = Options(vary=("hparams.margin=1,2", f"{rate}=1e-4,1e-3"), learners=("tlwd",))
