@@ -6,6 +6,7 @@ from pathlib import Path
 
 import jax
 import jax.numpy as jnp
+import matplotlib as mpl
 import numpy as np
 import pytest
 from tiny import tiny_params
@@ -114,3 +115,13 @@ def test_ids_that_int32_cannot_hold_are_refused():
     params = tiny_params().replace(road=levels, weather=levels, speed=levels, nearby=levels)
     with pytest.raises(ValueError, match=r"shape: '\(3, 200, 200, 200, 200\), 4800000000 states'; allowed: fewer than"):
         jrcjax.check_params(params)
+
+
+def test_tour_at_a_tiny_size():
+    text = (EXAMPLES / "tour.py").read_text()
+    assert "EPISODES, AGENTS = 60, 64" in text
+    names = {}
+    with mpl.rc_context({"backend": "agg"}):
+        exec(compile(text.replace("EPISODES, AGENTS = 60, 64", "EPISODES, AGENTS = 3, 2"), "tour.py", "exec"), names)
+    assert names["curves"].shape == (2, 3)
+    assert (np.diff(names["runs"].reward) > 0).all()  # more to detect, more to earn
