@@ -20,7 +20,10 @@ def _interrupt(number: int, frame: object) -> NoReturn:
 
 @contextlib.contextmanager
 def terminable() -> Iterator[None]:
-    """Makes SIGTERM interrupt like Ctrl-C."""
+    """Makes SIGTERM interrupt like Ctrl-C; only the main thread is ever interrupted, so elsewhere it does nothing."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
     before = signal.signal(signal.SIGTERM, _interrupt)
     try:
         yield

@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
+from jrcjax.numerics import threefry
 from jrcjax.readings import CountModel
 from jrcjax.types import Key
 
@@ -45,7 +46,7 @@ def object_count(key: Key, mean: Float[Array, ""], model: Int[Array, ""]) -> Int
     fixed = jnp.round(mean).astype(jnp.int32)
     # A zero mean draws zero at once, so that fixed counts do not pay for the Poisson sampler's loop.
     is_poisson = model == CountModel.POISSON
-    drawn = jax.random.poisson(key, jnp.where(is_poisson, mean, 0.0), dtype=jnp.int32)
+    drawn = jax.random.poisson(threefry(key), jnp.where(is_poisson, mean, 0.0), dtype=jnp.int32)
     return jnp.where(is_poisson, drawn, fixed)
 
 

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -460,6 +461,15 @@ def test_a_request_to_end_interrupts_too():
     with pytest.raises(KeyboardInterrupt), interrupts.terminable():
         signal.raise_signal(signal.SIGTERM)
     assert signal.getsignal(signal.SIGTERM) is before
+
+
+def test_a_sweep_in_a_thread_leaves_signals_alone():
+    def in_thread():
+        with interrupts.terminable():
+            return signal.getsignal(signal.SIGTERM)
+
+    with ThreadPoolExecutor(1) as pool:
+        assert pool.submit(in_thread).result() is signal.getsignal(signal.SIGTERM)
 
 
 def test_an_interrupt_waits_for_what_is_begun(request):
