@@ -1,8 +1,8 @@
 # %% [markdown]
-# # A tour of jrcjax
-#
-# An environment, its exact policy, 64 agents in seconds, a sweep, a figure. As a notebook:
-# `jupytext --to notebook examples/tour.py`, or open this file with Jupytext in Jupyter.
+"""A tour of jrcjax: an environment, its exact policy, 64 agents in seconds, a sweep, a figure.
+
+As a notebook: `jupytext --to notebook examples/tour.py`, or open this file with Jupytext in Jupyter.
+"""
 
 # %%
 import jax
