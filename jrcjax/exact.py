@@ -5,6 +5,8 @@ The tables come from the functions that the simulator calls in each slot, over a
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax
@@ -59,13 +61,15 @@ def level_transition(prior: Float[Array, " J"], persistence: Float[Array, ""]) -
     return persistence * jnp.eye(prior.shape[0]) + (1.0 - persistence) * prior[None, :]
 
 
+def _of_all(matrices: Sequence[Array]) -> Float[Array, "S S"]:
+    """The factors evolve independently, so the matrix of all is the Kronecker product of theirs."""
+    return functools.reduce(jnp.kron, matrices)
+
+
 @of_params
 def state_transition(params: EnvParams) -> Float[Array, "S S"]:
-    """P(s' | s), [S, S]. Factors evolve independently, so it is the Kronecker product of theirs."""
-    matrix = jnp.ones((1, 1))
-    for factor in params.factors:
-        matrix = jnp.kron(matrix, level_transition(factor.prior, factor.persistence))
-    return matrix
+    """P(s' | s), [S, S]."""
+    return _of_all([level_transition(factor.prior, factor.persistence) for factor in params.factors])
 
 
 @of_params
@@ -103,26 +107,16 @@ def _is_data(params: EnvParams) -> Bool[Array, " A"]:
     return jnp.arange(params.num_actions) < params.num_rates
 
 
-def _episode_mean(table: Float[Array, "S A"], params: EnvParams) -> Float[Array, "S A"]:
-    """(1/T) sum over t < T of P^t table, [S, A]: the mean over the T slots of an episode.
+def _mean_of_powers(params: EnvParams) -> Float[Array, "S S"]:
+    """(1/T) sum over t < T of P^t, [S, S]: the mean over the T slots of an episode.
 
-    P is the product of one matrix per factor, Q + kappa (I - Q), where Q averages over the factor's prior. With
-    x = Q x + (I - Q) x for every factor in turn, a table falls into parts that P^t multiplies by a number: the product
-    of the kappas of the factors whose second term it took, to the power t.
+    The power of a factor's matrix is the same matrix with kappa^t, and that of the whole is the product of theirs.
     """
-    slots = params.max_steps_in_episode
 
-    def mean_of(part: Array, rate: Array | None, axis: int) -> Array:
-        if axis == len(params.factors):
-            return part if rate is None else part * (1.0 - rate**slots) / (slots * (1.0 - rate))
-        factor = params.factors[axis]
-        weights = jnp.expand_dims(factor.prior, [i for i in range(part.ndim) if i != axis])
-        mean = (weights * part).sum(axis=axis, keepdims=True)
-        slower = factor.persistence if rate is None else rate * factor.persistence
-        return mean_of(mean, rate, axis + 1) + mean_of(part - mean, slower, axis + 1)
+    def power(slot: Int[Array, ""]) -> Float[Array, "S S"]:
+        return _of_all([level_transition(f.prior, f.persistence**slot) for f in params.factors])
 
-    mean = mean_of(table.reshape(*params.shape, -1), None, 0)
-    return mean.reshape(table.shape)
+    return jax.vmap(power)(jnp.arange(params.max_steps_in_episode)).mean(axis=0)
 
 
 @of_params
@@ -134,7 +128,7 @@ def as_observed(params: EnvParams, table: Float[Array, "S A"]) -> Float[Array, "
     is distributed as the state t slots later, and the mean is over the slots of an episode.
     """
     is_first = params.reward_state == RewardState.EPISODE_START
-    return jnp.where(is_first, _episode_mean(table, params), table)
+    return jnp.where(is_first, _mean_of_powers(params) @ table, table)
 
 
 @of_params

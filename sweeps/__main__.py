@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import importlib
 import sys
 from collections.abc import Callable
@@ -18,7 +19,7 @@ from sweeps.command import begin
 from sweeps.options import FLAGS, Count, Preset
 from sweeps.preset import preset_of
 from sweeps.studies.custom import CUSTOM, Options, custom_sweep
-from sweeps.sweep import Size, Study, Sweep, size_of
+from sweeps.sweep import Study, size_of
 
 
 @dataclass(frozen=True)
@@ -33,9 +34,9 @@ class Run:
     name: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="NAME")]
     """A sweep's or study's name, as `list` shows it; custom for one of your own."""
     seeds: Count = None
-    """Independent seeds. Default: 10 (multiverse 4), or 2 with --smoke."""
+    """Independent seeds. Default: 10 (multiverse and reconstruction 2), or 2 with --smoke."""
     episodes: Count = None
-    """Episodes per seed. Default: 1000 (multiverse 500), or 20 with --smoke."""
+    """Episodes per seed. Default: 1000 (multiverse and reconstruction 450), or 20 with --smoke."""
     preset: Preset = "paper"
     """The paper's parameters: paper, paper_table, or a TOML file of what differs from them, such as one from
     jrcjax.config.nuscenes."""
@@ -52,7 +53,10 @@ class Run:
     workers: int | None = None
     """Compute in so many processes on this machine, as a local Dask cluster."""
     readings: Count = None
-    """Of the multiverse, how many readings of the paper. Default: 512, or 2 with --smoke."""
+    """Of the multiverse and of the reconstruction, how many readings of the paper. Default: 512 and 336, or 2 and 4
+    with --smoke."""
+    confirm: Count = None
+    """Of the reconstruction, how many fresh seeds confirm what it found. Default: 100, or 1 with --smoke."""
     custom: tyro.conf.OmitArgPrefixes[Options] = field(default_factory=Options)
 
 
@@ -98,6 +102,7 @@ def _run(command: Command) -> int:
     console = begin()
     from jrcjax.types import choice
     from sweeps.engine.run import run_sweep
+    from sweeps.studies.reconstruction import effort_of
 
     if isinstance(command, Verify):
         return _verify(command)
@@ -109,26 +114,33 @@ def _run(command: Command) -> int:
     sweeps = study.smoke_sweeps if command.smoke and study.smoke_sweeps else study.sweeps
     options = {"resume": command.resume, "save_agents": command.save_agents}
     with interrupts.terminable(), _client(command) as client:
-        written = [run_sweep(sweep, size, command.out, console, **options, client=client) for sweep in sweeps]
+        run = functools.partial(run_sweep, size=size, out=command.out, console=console, **options, client=client)
+        if study.search:
+            effort = effort_of(command.readings, command.confirm, command.smoke)
+            written = _found(study.search)(effort, size, command.out, run)
+        else:
+            written = [run(sweep) for sweep in sweeps]
         if study.summary:
             written += _found(study.summary)(sweeps, size, command.out)
     print("\n".join(map(str, written)))
     return 0
 
 
-def _found(summary: str) -> Callable[[tuple[Sweep, ...], Size, Path], list[Path]]:
+def _found(name: str) -> Callable[..., list[Path]]:
     """The function that a study names as module:function."""
-    module, function = summary.split(":")
+    module, function = name.split(":")
     return getattr(importlib.import_module(module), function)
 
 
 def _study(command: Run, preset: str) -> Study:
     """The study of a name; options that are only for another one are refused."""
-    from sweeps.studies import multiverse
+    from sweeps.studies import multiverse, reconstruction
     from sweeps.studies.registry import EVERY_SWEEP, STUDIES
 
-    if command.name != multiverse.MULTIVERSE.name and command.readings is not None:
-        refuse("name", command.name, f"{multiverse.MULTIVERSE.name}, for which alone --readings is")
+    of_readings = (multiverse.MULTIVERSE.name, reconstruction.NAME)
+    for option, names in {"readings": of_readings, "confirm": of_readings[1:]}.items():
+        if getattr(command, option) is not None and command.name not in names:
+            refuse("name", command.name, f"{' or '.join(names)}, for which alone --{option} is")
     if command.name == CUSTOM:
         sweep = custom_sweep(command.custom, preset, (*STUDIES, *EVERY_SWEEP))
         return Study(CUSTOM, sweep.description, (sweep,), summary="paper_figs.studies.custom:summarise")

@@ -87,6 +87,10 @@ class Study:
     summary: str = ""
     """What draws conclusions from the results, as module:function of a layer above; found by name after the run. It
     takes the sweeps, the size and the folder of results, and returns the files that it wrote."""
+    search: str = ""
+    """For a study whose sweeps follow from one another: what runs them and draws conclusions, named and found like
+    `summary`. It takes the effort, the size, the folder of results and what runs a sweep, and returns the files that it
+    wrote."""
 
     def with_sweeps(self, sweeps: tuple[Sweep, ...]) -> Study:
         """The same study of these sweeps, in its tiny version, too."""

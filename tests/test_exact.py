@@ -29,7 +29,8 @@ def long_run(params, policy, convention, count_event_packets):
     event = model.event[:, None]
     reward = (visits * model.expected_reward()).sum()
     packets = (visits * model.packets * (1.0 if count_event_packets else 1.0 - event)).sum()
-    counted = visits * {"all_slots": 1.0, "event_slots": event, "radar_slots": ~model.is_data}[convention]
+    weights = (1.0, event, ~model.is_data)  # in the order of MissConvention
+    counted = visits * weights[convention]
     return reward, packets, (counted * model.miss).sum() / counted.sum()
 
 
@@ -159,7 +160,7 @@ def test_miss_detection_of_a_policy_that_only_transmits(target, convention):
     params = target.replace(miss_convention=convention)
     run = exact.evaluate_policy(params, exact.policy_of_actions(jnp.zeros(32, jnp.int32), 4))
     assert float(run.throughput) == pytest.approx(2.0, rel=10 * EPS)
-    if convention == "radar_slots":
+    if convention == MissConvention.RADAR_SLOTS:
         assert np.isnan(run.miss_detection)
     else:
         assert float(run.miss_detection) == pytest.approx(1.0, rel=10 * EPS)

@@ -175,6 +175,12 @@ def leaf_of(container: Any, entry: Entry) -> Any:
     return container
 
 
+def number_at(parameter: Parameter, point: Points) -> float:
+    """The number of one point, the first of those that a parameter sets; not of `Config`."""
+    entry = parameter.entries[0]
+    return float(np.asarray(leaf_of(getattr(point, parameter.container), entry))[entry.index])
+
+
 def _setting(path: str, parts: list[str]) -> Parameter:
     """A field of `Config`, which decides shapes or code: points that differ in it are programs of their own."""
     defaults = {field.name: getattr(Config(), field.name) for field in dataclasses.fields(Config)}

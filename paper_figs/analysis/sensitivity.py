@@ -46,13 +46,17 @@ class _Estimate(NamedTuple):
     pairs: np.ndarray
 
 
-def sensitivity(inputs: pd.DataFrame, output: np.ndarray, seed: int = 0) -> Sensitivity:
+def sensitivity(
+    inputs: pd.DataFrame, output: np.ndarray, seed: int = 0, blocks: np.ndarray | None = None
+) -> Sensitivity:
     """Sobol' indices of an output over a sample of independent inputs.
 
     Args:
       inputs: a row per point and a column per input; each is taken by its rank, so scales do not matter.
       output: [points].
       seed: of the surrogate and of the integrals.
+      blocks: number of each point's block [points], if some inputs are the same within blocks (a split-plot design):
+        a block's points are then left out together.
 
     Raises:
       ValueError: for fewer than `LEAST_POINTS` points.
@@ -64,7 +68,7 @@ def sensitivity(inputs: pd.DataFrame, output: np.ndarray, seed: int = 0) -> Sens
     if scale == 0:
         return _constant(list(inputs.columns))
     y = (output - output.mean()) / scale
-    folds = np.random.default_rng(seed).permutation(len(y)) % _FOLDS
+    folds = _folds(np.arange(len(y)) if blocks is None else blocks, seed)
     wholes = _surrogates(ranks, y, seed)
     fitted = {kind: _cross_validated(whole, ranks, y, folds) for kind, whole in wholes.items()}
     kind = min(fitted, key=lambda name: fitted[name][1])
@@ -85,6 +89,12 @@ def sensitivity(inputs: pd.DataFrame, output: np.ndarray, seed: int = 0) -> Sens
     of_pairs = pd.DataFrame(names, columns=["input", "other"])
     of_pairs["interaction"], of_pairs["interaction_low"], of_pairs["interaction_high"] = limits["pairs"]
     return Sensitivity(table, of_pairs, error, kind)
+
+
+def _folds(blocks: np.ndarray, seed: int) -> np.ndarray:
+    """Number of each point's fold; points of one block share theirs."""
+    known, places = np.unique(blocks, return_inverse=True)
+    return (np.random.default_rng(seed).permutation(len(known)) % _FOLDS)[places]
 
 
 def _constant(columns: list[str]) -> Sensitivity:
@@ -119,16 +129,19 @@ def _cross_validated(whole: Any, x: np.ndarray, y: np.ndarray, folds: np.ndarray
     """Fits without each fold, and their squared error on it over the variance."""
     from sklearn.base import clone
 
-    models: list[Any] = [clone(whole).fit(x[folds != fold], y[folds != fold]) for fold in range(_FOLDS)]  # pyright: ignore
-    squares = [np.square(model.predict(x[folds == fold]) - y[folds == fold]) for fold, model in enumerate(models)]
+    models: list[Any] = [clone(whole).fit(x[folds != fold], y[folds != fold]) for fold in np.unique(folds)]  # pyright: ignore
+    squares = [
+        np.square(model.predict(x[folds == fold]) - y[folds == fold])
+        for fold, model in zip(np.unique(folds), models, strict=True)
+    ]
     return models, float(np.concatenate(squares).mean() / y.var())
 
 
 def _interval(value: np.ndarray, without: list[np.ndarray], of_integral: np.ndarray) -> np.ndarray:
     """Value and limits [3, n], from the values without each fold and the standard error of the integrals."""
-    held = np.stack(without)
-    spread = (_FOLDS - 1) / _FOLDS * np.square(held - held.mean(axis=0)).sum(axis=0)
-    half = stats.t.ppf(0.975, _FOLDS - 1) * np.sqrt(spread + np.square(of_integral))
+    held, number = np.stack(without), len(without)
+    spread = (number - 1) / number * np.square(held - held.mean(axis=0)).sum(axis=0)
+    half = stats.t.ppf(0.975, number - 1) * np.sqrt(spread + np.square(of_integral))
     return np.stack([value, np.maximum(value - half, 0.0), np.minimum(value + half, 1.0)])
 
 

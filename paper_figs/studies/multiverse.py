@@ -7,13 +7,15 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 import xarray as xr
+from matplotlib.figure import Figure
 
 from paper_figs.analysis.intervals import proportion_effect
 from paper_figs.analysis.sensitivity import LEAST_POINTS, sensitivity
 from paper_figs.claims.judge import Judgement, is_on_its_side
-from paper_figs.claims.table import claims_of
+from paper_figs.claims.table import claims_of, number_of
+from paper_figs.plots import readings as plot
 from sweeps.studies.multiverse import POINTS
-from sweeps.studies.readings import READINGS, unit_of, values_at
+from sweeps.studies.readings import PER_BLOCK, READINGS, range_of, unit_of, values_at
 
 FIGURES = ("fig5b", "fig6", "fig7", "fig8", "fig9")
 VERDICTS = ("supported", "contradicted", "undecided")
@@ -60,6 +62,11 @@ def verdicts(judged: list[tuple[int, list[Judgement]]]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def agreement(of_reading: pd.DataFrame) -> pd.Series:
+    """By claim, C1 to C15, the share of its statements that hold in one reading."""
+    return of_reading.holds.astype(bool).groupby(of_reading.claim.map(number_of), sort=False).mean()
+
+
 def shares(found: pd.DataFrame) -> pd.DataFrame:
     """One row per claim: the share of readings with each verdict, and of those where it holds, with 95 % limits."""
     rows = []
@@ -79,17 +86,39 @@ def readings(numbers: list[int]) -> pd.DataFrame:
     return pd.DataFrame([{"reading": n} | values_at(unit_of(1, n)[0]) for n in numbers])
 
 
+HEADLINES = ("C3 (TLwD)", "C5 (highest)", "C8 (miss detection, DDQN)")
+"""Statements whose specification curves are drawn."""
+
+
+def specification(found: pd.DataFrame, sensitivity: pd.DataFrame) -> Figure:
+    """Specification curves of the paper's headlines, with the questions that decide each most."""
+    known = [claim for claim in HEADLINES if claim in set(sensitivity.claim)]
+    most = sensitivity.sort_values("total", ascending=False).groupby("claim").input
+    decisive = ["; ".join(most.get_group(claim)) for claim in known]
+    places = _inputs(int(found.reading.max()) + 1)
+    return plot.draw_specification(found.query("reading > 0"), places / places.max(), decisive, known)
+
+
+def _inputs(number: int) -> pd.DataFrame:
+    """Places of readings in their ranges, a column per question; levels as whole numbers."""
+    unit = unit_of(number)
+    for column, reading in enumerate(READINGS):
+        if levels := range_of(reading).levels:
+            unit[:, column] = np.floor(unit[:, column] * len(levels))
+    return pd.DataFrame(unit, columns=[reading.label for reading in READINGS])
+
+
 def decisive(found: pd.DataFrame) -> dict[str, pd.DataFrame]:
     """Sensitivity indices of each claim's effect over the readings, and interactions of its three strongest ones."""
     tables: dict[str, list[pd.DataFrame]] = {"sensitivity": [], "interactions": []}
     sampled = found.query("reading > 0")  # reading 0 is the default and no point of the sample
+    inputs = _inputs(int(found.reading.max()) + 1)
     for claim, of_claim in sampled.groupby("claim", sort=False):
         known = of_claim[np.isfinite(of_claim.value.to_numpy(float))]
         if len(known) < LEAST_POINTS:
             continue
-        unit = np.vstack([unit_of(1, int(number)) for number in known.reading])
-        inputs = pd.DataFrame(unit, columns=[reading.label for reading in READINGS])
-        indices = sensitivity(inputs, known.value.to_numpy(float))
+        numbers = known.reading.to_numpy(int)
+        indices = sensitivity(inputs.loc[numbers], known.value.to_numpy(float), blocks=numbers // PER_BLOCK)
         about = {"claim": claim, "surrogate": indices.surrogate, "surrogate_error": indices.error}
         tables["sensitivity"].append(indices.table.assign(**about))
         tables["interactions"].append(indices.pairs.assign(claim=claim))

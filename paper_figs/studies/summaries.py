@@ -8,7 +8,7 @@ from pathlib import Path
 import pandas as pd
 
 from jrcjax.files import write_text
-from paper_figs.plots import style
+from paper_figs.plots import readings, style
 from paper_figs.studies import multiverse, robustness
 from sweeps.preset import slots_of
 from sweeps.results import store
@@ -40,7 +40,7 @@ def summarise_robustness(sweeps: tuple[Sweep, ...], size: Size, out: Path) -> li
 
 
 def summarise_multiverse(sweeps: tuple[Sweep, ...], size: Size, out: Path) -> list[Path]:
-    """Tables of a multiverse, in OUT/multiverse/summary."""
+    """Tables and figures of a multiverse, in OUT/multiverse/summary."""
     folder = out / "multiverse" / "summary"
     folder.mkdir(parents=True, exist_ok=True)
     judged = []
@@ -55,4 +55,8 @@ def summarise_multiverse(sweeps: tuple[Sweep, ...], size: Size, out: Path) -> li
         "claims": multiverse.shares(found),
         **multiverse.decisive(found),
     }
-    return [*_write(folder, tables), _manifests(folder, sweeps, out)]
+    pictures = style.save(readings.draw_shares(tables["claims"]), folder / "claims")
+    if "sensitivity" in tables:
+        pictures += style.save(readings.draw_decisive(tables["sensitivity"]), folder / "sensitivity")
+        pictures += style.save(multiverse.specification(found, tables["sensitivity"]), folder / "specification")
+    return [*_write(folder, tables), *pictures, _manifests(folder, sweeps, out)]

@@ -1,7 +1,8 @@
 """The space of readings: all that the paper leaves open, with the range in which each is searched.
 
-Reading 0 is the default. Reading i > 0 is point i - 1 of a scrambled Sobol' sequence through the ranges, the same
-whatever the number of readings.
+Reading 0 is the default. Reading i > 0 is point i of a scrambled Sobol' sequence through the ranges, the same whatever
+the number of readings. What decides code, and so needs a program of its own, changes from one block of readings to the
+next and is the same within a block: a split-plot design.
 """
 
 from __future__ import annotations
@@ -11,14 +12,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jrcjax.config.paths import Points, Range, parameter_at
+from jrcjax.config.paths import Points, Range, number_at, parameter_at
 from jrcjax.learners.hparams import OPTIMISERS
 from jrcjax.model.params import EnvParams
 from sweeps.design import in_range, sobol
 from sweeps.preset import SOURCES, base_of
 
 SEED = 0
-"""Of the sequence."""
+"""Of the sequences."""
+PER_BLOCK = 16
+"""Readings in a block."""
 SOURCE = "source"
 """Name of the reading that says what source agents are trained with."""
 _SLOTS = EnvParams.max_steps_in_episode
@@ -87,15 +90,48 @@ def choices(reading: Reading) -> tuple[str, ...]:
     return SOURCES if reading.path == SOURCE else _parameters()[reading.path].readings
 
 
+def as_text(path: str, value: float) -> str | float:
+    """A reading's value as people and presets write it: the name of an index, or the number."""
+    if path == SOURCE:
+        return SOURCES[int(value)]
+    parameter = _parameters()[path]
+    return parameter.readings[int(value)] if parameter.readings else value
+
+
 def range_of(reading: Reading) -> Range:
     """Where a reading is searched."""
     return reading.where or _levels(*(float(i) for i in range(len(choices(reading)))))
 
 
+def default_unit() -> np.ndarray:
+    """The place of the default reading in the unit cube; of several levels it is the first."""
+    base, places = base_of("target", "paper").points, []
+    for reading in READINGS:
+        where = range_of(reading)
+        if where.levels:
+            places.append(0.5 / len(where.levels))
+            continue
+        ends = np.array([where.low, where.high, number_at(_parameters()[reading.path], base)])
+        low, high, value = np.log(ends) if where.is_log else ends
+        places.append((value - low) / (high - low))
+    return np.array(places)
+
+
+def is_static(reading: Reading) -> bool:
+    """Whether a reading decides code."""
+    return reading.path.startswith("config.")
+
+
 def unit_of(number: int, first: int = 0) -> np.ndarray:
     """Readings `first` to `first + number` in the unit cube, [number, readings]; reading 0 has NaN."""
-    cube = sobol(len(READINGS), number, SEED, skip=max(first - 1, 0))
-    return np.vstack([np.full((1, len(READINGS)), np.nan), cube[: number - 1]]) if first == 0 else cube
+    static = np.array([is_static(reading) for reading in READINGS])
+    blocks = np.arange(first, first + number) // PER_BLOCK
+    cube = np.empty((number, len(READINGS)))
+    cube[:, ~static] = sobol(int((~static).sum()), number, SEED, skip=first)
+    cube[:, static] = sobol(int(static.sum()), int(blocks[-1]) + 1, SEED + 1)[blocks]
+    if first == 0:
+        cube[0] = np.nan
+    return cube
 
 
 def values_at(unit: np.ndarray) -> dict[str, float]:

@@ -143,7 +143,7 @@ EPISODE = [
     (True, False, 4.0, 1.0), (True, True, 2.0, 1.0), (False, True, 0.0, 0.25),
     (False, False, 0.0, 0.5), (True, False, 2.0, 1.0), (False, False, 0.0, 0.75),
 ]  # fmt: skip
-MISS = {"all_slots": 4.5 / 6, "event_slots": 1.25 / 2, "radar_slots": 1.5 / 3}
+MISS = (4.5 / 6, 1.25 / 2, 1.5 / 3)  # in the order of MissConvention
 
 
 def _measured(episode, params):

@@ -1,0 +1,144 @@
+"""Figures about many readings of the paper: where claims hold, what decides, and what a search found."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from paper_figs.plots import style
+
+_DEFAULT = "default"
+_BLUE, _ORANGE, _GREEN, _GREY = "#0072B2", "#D55E00", "#009E73", "0.6"
+_DECIDING = 5  # readings whose choices stand under a specification curve
+
+
+@style.styled
+def draw_shares(claims: pd.DataFrame) -> Figure:
+    """The share of readings in which each statement holds by its estimate, is supported, and is contradicted.
+
+    Args:
+      claims: a row per statement, as `paper_figs.studies.multiverse.shares` gives them.
+    """
+    figure = Figure(figsize=(style.TWO_COLUMNS[0], 0.125 * len(claims) + 1.0))
+    axes, rows = figure.subplots(), np.arange(len(claims))[::-1]
+    for name, colour, marker, shift in (
+        ("holds", "black", "o", 0.0),
+        ("supported", _GREEN, "^", 0.22),
+        ("contradicted", _ORANGE, "v", -0.22),
+        ("negligible", _BLUE, "s", -0.22),
+    ):
+        value = claims[name].to_numpy()
+        bars = np.clip([value - claims[f"{name}_low"], claims[f"{name}_high"] - value], 0.0, None)
+        if name == "negligible" and not value.any():
+            continue
+        look = {"markersize": 2.5, "elinewidth": 0.6, "linestyle": ""}
+        axes.errorbar(100 * value, rows + shift, xerr=100 * bars, marker=marker, color=colour, label=name, **look)
+    axes.set_yticks(rows, claims.claim, fontsize=5)
+    axes.set_ylim(-1, len(claims))
+    axes.set_xlim(-2, 102)
+    axes.grid(axis="y", linewidth=0.2)
+    axes.set_xlabel("share of readings (%)")
+    figure.suptitle(f"Where the claims hold: {int(claims.readings.max())} readings (bars: 95 % intervals)")
+    figure.legend(loc="outside lower center", ncols=4)
+    return figure
+
+
+@style.styled
+def draw_decisive(sensitivity: pd.DataFrame) -> Figure:
+    """What decides each statement's effect: total-order indices as a map, statements by readings.
+
+    Args:
+      sensitivity: as `paper_figs.studies.multiverse.decisive` gives it.
+    """
+    total = sensitivity.pivot_table(index="claim", columns="input", values="total", sort=False)
+    error = sensitivity.drop_duplicates("claim").set_index("claim").surrogate_error
+    figure = Figure(figsize=(style.TWO_COLUMNS[0], 0.115 * len(total) + 2.0))
+    axes = figure.subplots()
+    picture = axes.imshow(total, cmap="viridis", vmin=0, vmax=1, aspect="auto")
+    axes.set_xticks(range(total.shape[1]), list(total.columns), rotation=90, fontsize=5)
+    axes.set_yticks(range(len(total)), [f"{claim}, error {error[claim]:.2f}" for claim in total.index], fontsize=5)
+    axes.tick_params(length=0)
+    figure.colorbar(picture, ax=axes, label="total-order index", shrink=0.5)
+    figure.suptitle("What decides each effect (error: of the surrogate, cross-validated, over the variance)")
+    return figure
+
+
+@style.styled
+def draw_specification(found: pd.DataFrame, readings: pd.DataFrame, decisive: list[str], claims: list[str]) -> Figure:
+    """Specification curves: a statement's effect in all readings in ascending order, and what these readings are.
+
+    Args:
+      found: as `paper_figs.studies.multiverse.verdicts` gives it.
+      readings: a row per reading, a column per question with its place in the range, in [0, 1].
+      decisive: for each statement the questions that decide most, by name.
+      claims: the statements.
+    """
+    figure = Figure(figsize=(style.TWO_COLUMNS[0], 4.2))
+    rows = figure.subplots(2, len(claims), height_ratios=(2, 1), squeeze=False, sharex="col")
+    for (curve, choices), claim in zip(rows.T, claims, strict=True):
+        here = found[(found.claim == claim) & np.isfinite(found.value)].sort_values("value")
+        order = np.arange(len(here))
+        curve.vlines(order, here.ci_low, here.ci_high, color=_GREY, linewidth=0.3)
+        curve.scatter(order, here.value, s=2, c=np.where(here.holds.astype(bool), _GREEN, _ORANGE), zorder=2)
+        curve.axhline(0.0, color="black", linewidth=0.5)
+        curve.set_ylim(*_room(here.value.to_numpy(float)))
+        curve.set_title(f"{claim}: holds in {100 * here.holds.astype(bool).mean():.0f} %", fontsize=7)
+        _draw_choices(choices, readings.loc[here.reading.astype(int)], decisive[claims.index(claim)])
+        choices.set_xlabel("readings in order of the effect", fontsize=7)
+    rows[0, 0].set_ylabel("effect")
+    figure.suptitle("Specification curves (green: on the claim's side), and the readings that decide most")
+    return figure
+
+
+def _room(values: np.ndarray) -> tuple[float, float]:
+    low, high = np.quantile(values, (0.02, 0.98)) if len(values) else (0.0, 1.0)
+    room = 0.2 * max(high - low, 1e-6)
+    return min(low, 0.0) - room, max(high, 0.0) + room
+
+
+def _draw_choices(axes: Axes, readings: pd.DataFrame, questions: str) -> None:
+    names = questions.split("; ")[:_DECIDING]
+    for row, name in enumerate(names):
+        axes.scatter(np.arange(len(readings)), row + 0.8 * readings[name] - 0.4, s=0.5, color="black")
+    axes.set_yticks(range(len(names)), names, fontsize=5)
+    axes.grid(axis="y", linewidth=0.2)
+
+
+@style.styled
+def draw_search(tried: pd.DataFrame, confirmed: pd.DataFrame) -> Figure:
+    """How the search went, and what it promised beside what fresh seeds gave.
+
+    Args:
+      tried: a row per reading, in order, with its `agreement`.
+      confirmed: a row per confirmed reading and statement.
+    """
+    figure = Figure(figsize=(style.TWO_COLUMNS[0], 2.9))
+    way, claims = figure.subplots(1, 2, width_ratios=(2, 3))
+    order = np.arange(len(tried))
+    searched = tried.reading.str.startswith("search").to_numpy()
+    for mask, colour, label in ((~searched, _GREY, "design"), (searched, _BLUE, "search")):
+        if mask.any():
+            way.plot(order[mask], 100 * tried.agreement[mask], ".", color=colour, markersize=2, label=label)
+    way.plot(order, 100 * tried.agreement.cummax(), color="black", linewidth=0.8, label="best so far")
+    if (default := tried[tried.reading == _DEFAULT]).size:
+        way.axhline(100 * default.agreement.iloc[0], color=_ORANGE, linestyle=":", label="default")
+    way.set_xlabel("readings tried")
+    way.set_ylabel("agreement with the text (%)")
+    way.legend(fontsize=6)
+    best = confirmed[confirmed.best_for.str.split().map(lambda what: "all" in what)]
+    number = best.claim.str.split(" ").str[0]
+    seeds = int(best.n_seeds.max())
+    places = {name: place for place, name in enumerate(dict.fromkeys(number))}
+    for column, colour, shift, label in (
+        ("promised", _GREY, -0.2, "promised by the search"),
+        ("holds", _BLUE, 0.2, f"{seeds} fresh seeds"),
+    ):
+        share = best[column].astype(bool).groupby(number, sort=False).mean()
+        claims.bar([places[name] + shift for name in share.index], 100 * share, width=0.38, color=colour, label=label)
+    claims.set_xticks(list(places.values()), list(places), fontsize=6)
+    claims.set_ylabel("statements that hold (%)")
+    claims.set_title("the best reading, claim by claim", fontsize=8)
+    claims.legend(fontsize=6)
+    return figure

@@ -1,0 +1,79 @@
+"""The search for the reading in which the paper is right: where it starts, and how many readings it tries.
+
+What judges readings lies in a layer above, see `paper_figs.studies.reconstruction`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from jrcjax.checks import require_integer
+from sweeps.studies.multiverse import SIZE, SMOKE, block_sweep
+from sweeps.studies.readings import PER_BLOCK, values_at
+from sweeps.sweep import Size, Study, Sweep
+
+NAME = "reconstruction"
+STARTS = 3
+"""Readings with different code that the search starts from."""
+_MOST = 2**20
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much to search and to confirm."""
+
+    readings: int = 336
+    """Readings that are tried."""
+    confirm: int = 100
+    """Fresh seeds of each reading that is confirmed; those of the search count nowhere else."""
+    starts: int = STARTS
+    per_generation: int = PER_BLOCK
+    """Readings that are tried as one block before the next ones are chosen."""
+
+
+USUAL = Effort()
+TINY = Effort(readings=4, confirm=1, starts=1, per_generation=4)
+
+
+def effort_of(readings: int | None, confirm: int | None, smoke: bool) -> Effort:
+    """The effort that command-line options ask for.
+
+    Raises:
+      ValueError: naming the argument, the value and what is allowed.
+    """
+    usual = TINY if smoke else USUAL
+    readings = usual.readings if readings is None else readings
+    confirm = usual.confirm if confirm is None else confirm
+    require_integer("readings", readings, usual.per_generation, _MOST)
+    require_integer("confirm", confirm, 1, _MOST)
+    return Effort(readings, confirm, usual.starts, usual.per_generation)
+
+
+def of_seeds(size: Size, seeds: int) -> Size:
+    """The same size with so many seeds."""
+    return replace(size, seeds=seeds)
+
+
+def generation_sweep(first: int, units: Sequence[np.ndarray]) -> Sweep:
+    """Readings at some places of the unit cube, numbered from `first` on, as one block."""
+    numbers = range(first, first + len(units))
+    return block_sweep(f"{NAME}/tried", numbers, [values_at(unit) for unit in units])
+
+
+def confirmation_sweep(units: Sequence[np.ndarray]) -> Sweep:
+    """The readings that are confirmed, as one block."""
+    return block_sweep(f"{NAME}/confirmed", range(len(units)), [values_at(unit) for unit in units])
+
+
+RECONSTRUCTION = Study(
+    name=NAME,
+    description="the reading in which most of the paper's text holds: search, and confirmation with fresh seeds",
+    sweeps=(),
+    size=SIZE,
+    smoke_size=SMOKE,
+    presets=("paper",),
+    search="paper_figs.studies.reconstruction:search",
+)
