@@ -44,8 +44,7 @@ def expected_sarsa(spec, config) -> Learner:
     def update(table, transition, step, words, hparams):
         s, a, reward, following, discount = transition
         visits = table.visits.at[s, a].add(1.0)
-        value = (chances(table.q[following]) * table.q[following]).sum()
-        target = reward + discount * value
+        target = reward + discount * (chances(table.q[following]) * table.q[following]).sum()
         return Table(table.q.at[s, a].add(visits[s, a] ** -hparams.step_exponent * (target - table.q[s, a])), visits)
 
     return Learner(num_words=2, init=init, act=act, update=update, policy=lambda table: greedy_policy(table.q))

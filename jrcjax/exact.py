@@ -113,10 +113,10 @@ def _mean_of_powers(params: EnvParams) -> Float[Array, "S S"]:
     The power of a factor's matrix is the same matrix with kappa^t, and that of the whole is the product of theirs.
     """
 
-    def power(slot: Int[Array, ""]) -> Float[Array, "S S"]:
+    def power(slot: Float[Array, ""]) -> Float[Array, "S S"]:
         return _of_all([level_transition(f.prior, f.persistence**slot) for f in params.factors])
 
-    return jax.vmap(power)(jnp.arange(params.max_steps_in_episode)).mean(axis=0)
+    return jax.vmap(power)(jnp.arange(params.max_steps_in_episode, dtype=jnp.float32)).mean(axis=0)
 
 
 @of_params

@@ -205,5 +205,5 @@ def _chosen(field: str, value: Any, there: Sequence[Any]) -> Any:
         return there[0]
     if isinstance(value, bool) or value not in there:
         numbers = f"one of {there[0]} to {there[-1]}" if len(there) > 8 else f"one of {', '.join(map(repr, there))}"
-        refuse(field, "None" if value is None else str(value), f"{numbers}, which the file holds")
+        refuse(field, "None" if value is None else value, f"{numbers}, which the file holds")
     return value

@@ -399,8 +399,8 @@ def test_an_agent_of_a_sweep_is_the_one_that_its_results_tell_of(folder, small, 
 @pytest.mark.parametrize(
     ("which", "message"),
     [
-        ({}, "learner: 'None'; allowed: one of 'q_learning', 'ddqn', which the file holds"),
-        ({"learner": "round_robin"}, "learner: 'round_robin'; allowed: one of 'q_learning', 'ddqn'"),
+        ({}, "learner: 'None'; allowed: one of 'ddqn', 'q_learning', which the file holds"),
+        ({"learner": "round_robin"}, "learner: 'round_robin'; allowed: one of 'ddqn', 'q_learning'"),
         ({"learner": "ddqn"}, "point: 'None'; allowed: one of 0, 1"),
         ({"learner": "ddqn", "point": 2}, "point: 2; allowed: one of 0, 1"),
         ({"learner": "ddqn", "point": 0, "seed": 7}, "seed: 7; allowed: one of 0, 1"),

@@ -222,7 +222,7 @@ def test_values_that_mean_nothing_are_refused(path, text, message, point):
         (["--vary", "env.radar.density"], "vary: 'env.radar.density'; allowed: PATH=VALUES"),
         (["--vary", "env.speed.event_probability.low=0.5,1.5"], "speed.event_probability: [1.5, "),
         (["--vary", "hparams.discount=0.5,1"], "hparams.discount: 1.0; allowed: a number in [0, 1)"),
-        (["--vary", "env.radar.density=-1,5"], "radar.density: -1.0; allowed: a number of objects > 0"),
+        (["--vary", "env.radar.density=-1,5"], "radar.density: -1.0; allowed: a number > 0"),
         (["--vary", "hparams.margin=5,9", "--set", "hparams.margin=7"], "set: 'hparams.margin'; allowed: another"),
         (
             ["--vary", "hparams.margin=5,9", "--vary", "hparams.margin=7"],

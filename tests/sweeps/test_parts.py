@@ -405,8 +405,9 @@ def test_sampled_parts_are_spread_from_first_to_last():
             sample_of(held, bad)
 
 
-def test_results_name_what_decides_their_last_bit(folder):
+def test_results_name_what_decides_their_last_bit(folder, monkeypatch):
     made = parts.parts_of(folder)[0].provenance
+    monkeypatch.setenv("XLA_FLAGS", made["machine"]["xla_flags"])  # commands in this process add to it
     assert {"command", "versions", "machine", "git_commit", "git_modified"} <= made.keys()
     assert {"jrcjax", "jaxlib"} <= made["versions"].keys()
     assert set(made["machine"]["cpu_features"]) <= set(Path("/proc/cpuinfo").read_text().split())
