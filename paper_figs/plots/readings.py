@@ -66,40 +66,43 @@ def draw_decisive(sensitivity: pd.DataFrame) -> Figure:
 
 
 @style.styled
-def draw_specification(found: pd.DataFrame, readings: pd.DataFrame, decisive: list[str], claims: list[str]) -> Figure:
+def draw_specification(
+    found: pd.DataFrame, readings: pd.DataFrame, decisive: dict[str, list[str]], limits: dict[str, float]
+) -> Figure:
     """Specification curves: a statement's effect in all readings in ascending order, and what these readings are.
 
     Args:
       found: as `paper_figs.studies.multiverse.verdicts` gives it.
       readings: a row per reading, a column per question with its place in the range, in [0, 1].
-      decisive: for each statement the questions that decide most, by name.
-      claims: the statements.
+      decisive: by statement, names of the questions that decide most.
+      limits: by statement, what its effect is held against.
     """
     figure = Figure(figsize=(style.TWO_COLUMNS[0], 4.2))
-    rows = figure.subplots(2, len(claims), height_ratios=(2, 1), squeeze=False, sharex="col")
-    for (curve, choices), claim in zip(rows.T, claims, strict=True):
-        here = found[(found.claim == claim) & np.isfinite(found.value)].sort_values("value")
+    rows = figure.subplots(2, len(limits), height_ratios=(2, 1), squeeze=False, sharex="col")
+    for (curve, choices), (claim, limit) in zip(rows.T, limits.items(), strict=True):
+        here = found[(found.claim == claim) & np.isfinite(found.value)]
+        here = here.iloc[np.argsort(here.value.to_numpy(float))]
         order = np.arange(len(here))
         curve.vlines(order, here.ci_low, here.ci_high, color=_GREY, linewidth=0.3)
         curve.scatter(order, here.value, s=2, c=np.where(here.holds.astype(bool), _GREEN, _ORANGE), zorder=2)
-        curve.axhline(0.0, color="black", linewidth=0.5)
-        curve.set_ylim(*_room(here.value.to_numpy(float)))
+        curve.axhline(limit, color="black", linewidth=0.5)
+        curve.set_ylim(*_room(here.value.to_numpy(float), limit))
         curve.set_title(f"{claim}: holds in {100 * here.holds.astype(bool).mean():.0f} %", fontsize=7)
-        _draw_choices(choices, readings.loc[here.reading.astype(int)], decisive[claims.index(claim)])
+        _draw_choices(choices, readings.loc[here.reading.astype(int)], decisive[claim][:_DECIDING])
         choices.set_xlabel("readings in order of the effect", fontsize=7)
     rows[0, 0].set_ylabel("effect")
     figure.suptitle("Specification curves (green: on the claim's side), and the readings that decide most")
     return figure
 
 
-def _room(values: np.ndarray) -> tuple[float, float]:
-    low, high = np.quantile(values, (0.02, 0.98)) if len(values) else (0.0, 1.0)
-    room = 0.2 * max(high - low, 1e-6)
-    return min(low, 0.0) - room, max(high, 0.0) + room
+def _room(values: np.ndarray, limit: float) -> tuple[float, float]:
+    """Limits of an axis that shows most values and the limit."""
+    shown = [*np.quantile(values, (0.02, 0.98)), limit] if len(values) else [limit]
+    room = 0.2 * max(max(shown) - min(shown), 1e-6)
+    return min(shown) - room, max(shown) + room
 
 
-def _draw_choices(axes: Axes, readings: pd.DataFrame, questions: str) -> None:
-    names = questions.split("; ")[:_DECIDING]
+def _draw_choices(axes: Axes, readings: pd.DataFrame, names: list[str]) -> None:
     for row, name in enumerate(names):
         axes.scatter(np.arange(len(readings)), row + 0.8 * readings[name] - 0.4, s=0.5, color="black")
     axes.set_yticks(range(len(names)), names, fontsize=5)
@@ -127,16 +130,17 @@ def draw_search(tried: pd.DataFrame, confirmed: pd.DataFrame) -> Figure:
     way.set_xlabel("readings tried")
     way.set_ylabel("agreement with the text (%)")
     way.legend(fontsize=6)
-    best = confirmed[confirmed.best_for.str.split().map(lambda what: "all" in what)]
-    number = best.claim.str.split(" ").str[0]
+    best = confirmed[[("all" in what.split()) for what in confirmed.best_for]]
+    number = np.array([claim.split(" ")[0] for claim in best.claim])
     seeds = int(best.n_seeds.max())
     places = {name: place for place, name in enumerate(dict.fromkeys(number))}
     for column, colour, shift, label in (
         ("promised", _GREY, -0.2, "promised by the search"),
         ("holds", _BLUE, 0.2, f"{seeds} fresh seeds"),
     ):
-        share = best[column].astype(bool).groupby(number, sort=False).mean()
-        claims.bar([places[name] + shift for name in share.index], 100 * share, width=0.38, color=colour, label=label)
+        held = best[column].to_numpy(bool)
+        share = [100.0 * held[number == name].mean() for name in places]
+        claims.bar(np.arange(len(places)) + shift, share, width=0.38, color=colour, label=label)
     claims.set_xticks(list(places.values()), list(places), fontsize=6)
     claims.set_ylabel("statements that hold (%)")
     claims.set_title("the best reading, claim by claim", fontsize=8)

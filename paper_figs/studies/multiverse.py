@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from paper_figs.analysis.intervals import proportion_effect
 from paper_figs.analysis.sensitivity import LEAST_POINTS, sensitivity
 from paper_figs.claims.judge import Judgement, is_on_its_side
-from paper_figs.claims.table import claims_of, number_of
+from paper_figs.claims.table import CLAIMS, claims_of, number_of
 from paper_figs.plots import readings as plot
 from sweeps.studies.multiverse import POINTS
 from sweeps.studies.readings import PER_BLOCK, READINGS, range_of, unit_of, values_at
@@ -92,11 +92,11 @@ HEADLINES = ("C3 (TLwD)", "C5 (highest)", "C8 (miss detection, DDQN)")
 
 def specification(found: pd.DataFrame, sensitivity: pd.DataFrame) -> Figure:
     """Specification curves of the paper's headlines, with the questions that decide each most."""
-    known = [claim for claim in HEADLINES if claim in set(sensitivity.claim)]
-    most = sensitivity.sort_values("total", ascending=False).groupby("claim").input
-    decisive = ["; ".join(most.get_group(claim)) for claim in known]
+    most = sensitivity.sort_values("total", ascending=False)
+    decisive = {claim: most.input[most.claim == claim].tolist() for claim in HEADLINES}
+    limits = {c.claim: float(c.limit) for c in CLAIMS if decisive.get(c.claim) and isinstance(c.limit, float)}
     places = _inputs(int(found.reading.max()) + 1)
-    return plot.draw_specification(found.query("reading > 0"), places / places.max(), decisive, known)
+    return plot.draw_specification(found.query("reading > 0"), places / places.max(), decisive, limits)
 
 
 def _inputs(number: int) -> pd.DataFrame:

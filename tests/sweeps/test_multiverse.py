@@ -6,10 +6,23 @@ import pandas as pd
 import pytest
 
 import jrcjax
+from jrcjax.config.paths import number_at, parameter_at
 from sweeps.__main__ import main
 from sweeps.engine.job import Job
+from sweeps.preset import base_of
 from sweeps.studies.multiverse import POINTS, SMOKE, sweeps_of
-from sweeps.studies.readings import READINGS, SOURCE, choices, range_of, unit_of, values_at
+from sweeps.studies.readings import (
+    PER_BLOCK,
+    READINGS,
+    SOURCE,
+    as_text,
+    choices,
+    default_unit,
+    is_static,
+    range_of,
+    unit_of,
+    values_at,
+)
 from sweeps.studies.registry import SWEEPS
 
 
@@ -27,8 +40,8 @@ def test_a_reading_is_the_same_whatever_the_number_of_readings():
 
 
 def test_readings_lie_in_their_ranges_and_each_level_is_tried_equally_often():
-    rows = pd.DataFrame([values_at(unit) for unit in unit_of(257)[1:]])
-    for reading in READINGS:
+    rows = pd.DataFrame([values_at(unit) for unit in unit_of(256, first=256)])
+    for reading in [reading for reading in READINGS if not is_static(reading)]:
         values, where = rows[reading.path].to_numpy(), range_of(reading)
         if where.levels:
             counts = [np.sum(values == level) for level in where.levels]
@@ -40,6 +53,14 @@ def test_readings_lie_in_their_ranges_and_each_level_is_tried_equally_often():
     sgd = rows["config.optimiser"] == 1
     assert rows["hparams.learning_rate"][sgd].max() <= 1e-4
     assert rows["hparams.learning_rate"][~sgd].max() > 5e-3
+    # What decides code is the same within a block, and equally often each over the blocks.
+    static = [reading.path for reading in READINGS if is_static(reading)]
+    assert set(static) == {f"config.{name}" for name in ("optimiser", "gradient_clipping", "target_update", "n_step")}
+    many = pd.DataFrame([values_at(unit) for unit in unit_of(64 * PER_BLOCK)[1:]], index=range(1, 64 * PER_BLOCK))
+    blocks = many.groupby(many.index // PER_BLOCK)[static]
+    assert (blocks.nunique() == 1).all().all()
+    for path, values in blocks.first().items():
+        assert np.ptp(values.value_counts()) <= 2, path
     assert choices(next(reading for reading in READINGS if reading.path == SOURCE)) == ("same", "table1")
 
 
@@ -77,3 +98,15 @@ def test_a_tiny_multiverse_judges_all_claims_in_each_reading(tmp_path):
     assert {claim.split()[0] for claim in found.claim} == {f"C{number}" for number in range(1, 16)}
     assert (pd.read_csv(summary / "claims.csv").readings == 2).all()
     assert main([*run, "--resume"]) == 0
+
+
+def test_the_default_has_a_place_in_the_space():
+    base = base_of("target", "paper")
+    for path, value in values_at(default_unit()).items():
+        if path == SOURCE:
+            assert value == 0
+        elif path.startswith("config."):
+            default = getattr(base.config, path.removeprefix("config."))
+            assert as_text(path, value) == default, path
+        else:
+            assert value == pytest.approx(number_at(parameter_at(path, base.points), base.points), rel=1e-5), path
