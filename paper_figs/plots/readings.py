@@ -130,7 +130,7 @@ def draw_search(tried: pd.DataFrame, confirmed: pd.DataFrame) -> Figure:
     way.set_xlabel("readings tried")
     way.set_ylabel("agreement with the text (%)")
     way.legend(fontsize=6)
-    best = confirmed[[("all" in what.split()) for what in confirmed.best_for]]
+    best = confirmed.loc[[("all" in what.split()) for what in confirmed.best_for]]
     number = np.array([claim.split(" ")[0] for claim in best.claim])
     seeds = int(best.n_seeds.max())
     places = {name: place for place, name in enumerate(dict.fromkeys(number))}
