@@ -1,0 +1,160 @@
+"""The search for a reading, in made-up worlds in which the right one is known."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from jrcjax.config.paths import parameter_at
+from paper_figs.studies import multiverse, reconstruction
+from sweeps.__main__ import main
+from sweeps.preset import SOURCES, base_of, preset_of
+from sweeps.studies.readings import PER_BLOCK, READINGS, SOURCE, default_unit, is_static, unit_of, values_at
+from sweeps.studies.reconstruction import Effort, effort_of
+from sweeps.sweep import Size
+
+RATE = [reading.path for reading in READINGS].index("hparams.learning_rate")
+CLAIMS = [f"C{number} ({part})" for number in range(1, 16) for part in "ab"]
+SIZE = Size(seeds=2, episodes=5)
+
+
+def verdicts_of(holds):
+    number = len(CLAIMS)
+    return pd.DataFrame(
+        {
+            "claim": CLAIMS,
+            "value": np.arange(number, dtype=float),
+            "ci_low": np.zeros(number),
+            "ci_high": np.ones(number),
+            "verdict": "undecided",
+            "holds": holds,
+            "negligible": None,
+            "n_seeds": 3,
+        }
+    )
+
+
+@pytest.fixture
+def small_steps_only(monkeypatch):
+    """A world where the more statements hold the smaller the steps are; later seeds take back the first claim."""
+    units, seen = {}, []
+
+    def remember(make):
+        def kept(*args):
+            sweep = make(*args)
+            units[sweep.name] = args[-1]
+            return sweep
+
+        return kept
+
+    def verdicts(sweep, size, out, first_seed):
+        seen.append((sweep.name, size.seeds, first_seed))
+        found = {}
+        for number, unit in enumerate(units[sweep.name]):
+            holds = np.arange(len(CLAIMS)) >= len(CLAIMS) * unit[RATE]
+            holds[:2] &= first_seed == 0
+            found[number] = verdicts_of(holds)
+        return found
+
+    for name in ("generation_sweep", "confirmation_sweep"):
+        monkeypatch.setattr(reconstruction, name, remember(getattr(reconstruction, name)))
+    monkeypatch.setattr(reconstruction, "_verdicts", verdicts)
+    return seen
+
+
+def test_the_search_finds_the_reading_and_confirms_it_with_other_seeds(small_steps_only, tmp_path):
+    ran = []
+    effort = Effort(readings=160, confirm=7, starts=1, per_generation=16)
+    reconstruction.search(effort, SIZE, tmp_path, lambda sweep, size=SIZE: ran.append(size.seeds))
+    summary = tmp_path / "reconstruction" / "summary"
+    tried = pd.read_csv(summary / "tried.csv")
+    assert len(tried) == 160
+    rates = tried["hparams.learning_rate"]
+    assert rates[-16:].median() < 1e-5 < 1e-4 < rates[:16].median()
+    assert ran == [2] * 10 + [9]  # 7 fresh seeds beyond the 2 of the search
+    assert small_steps_only[-1][1:] == (9, 2)
+    confirmed = pd.read_csv(summary / "confirmed.csv")
+    best = confirmed[confirmed.best_for.str.contains("all")]
+    assert best.promised[1:2].all()
+    assert not best.holds[:2].any()  # what the search promised and fresh seeds did not give
+    preset = preset_of(str(summary / reconstruction.PRESET))
+    rate = float(base_of("target", preset).points.hparams.learning_rate)
+    assert rate == pytest.approx(tried["hparams.learning_rate"][tried.agreement.argmax()], rel=1e-5)
+
+
+def test_a_search_is_the_same_each_time(small_steps_only, tmp_path):
+    tables = []
+    for name in ("first", "second"):
+        effort = Effort(readings=8, confirm=1, starts=2, per_generation=4)
+        reconstruction.search(effort, SIZE, tmp_path / name, lambda sweep, size=SIZE: None)
+        tables.append((tmp_path / name / "reconstruction" / "summary" / "tried.csv").read_bytes())
+    assert tables[0] == tables[1]
+
+
+def test_what_decides_code_stays_as_it_is_at_the_start():
+    optimiser = reconstruction._Optimiser(unit_of(1, PER_BLOCK)[0], 8, seed=0)
+    start = values_at(unit_of(1, PER_BLOCK)[0])
+    for _ in range(3):
+        units = optimiser.ask()
+        for values in map(values_at, units):
+            assert {r.path: values[r.path] == start[r.path] for r in READINGS if is_static(r)} == {
+                r.path: True for r in READINGS if is_static(r)
+            }
+            for path, value in values.items():
+                if path != SOURCE:
+                    names = parameter_at(path, base_of("target", "paper").points).readings
+                    assert not names or 0 <= value < len(names)
+            assert 0 <= values[SOURCE] < len(SOURCES)
+        optimiser.tell([float(unit[RATE]) for unit in units])
+
+
+def test_the_best_of_a_multiverse_are_starts_and_may_be_chosen(tmp_path):
+    folder = tmp_path / "multiverse" / "summary"
+    folder.mkdir(parents=True)
+    rows = [
+        verdicts_of(np.arange(len(CLAIMS)) < held).assign(reading=number)
+        for number, held in {0: 5, 17: 20, 18: 19, 40: 3}.items()
+    ]
+    pd.concat(rows).to_csv(folder / "verdicts.csv", index=False)
+    known = reconstruction._of_multiverse(tmp_path)
+    assert [one.name for one in known] == ["default", "multiverse 17", "multiverse 18", "multiverse 40"]
+    starts = reconstruction._starts(known, Effort(starts=2))
+    np.testing.assert_array_equal(starts[0], unit_of(1, 17)[0])  # and not 18, which is in the same block
+    np.testing.assert_array_equal(starts[1], default_unit())
+    (best, what), *_ = reconstruction.choice_of(known)
+    assert best.name == "multiverse 17"
+    assert what[0] == "all"
+    assert best.agreement == pytest.approx(10 / 15)
+
+
+def test_agreement_weighs_claims_and_not_statements():
+    of = verdicts_of(np.zeros(len(CLAIMS), bool))
+    of.loc[:3, "holds"] = True  # C1 and C2 whole
+    of = pd.concat([of, of.iloc[[0]].assign(claim="C1 (c)", holds=False)])
+    assert multiverse.agreement(of).mean() == pytest.approx((2 / 3 + 1) / 15)
+
+
+@pytest.mark.parametrize(
+    ("flags", "message"),
+    [
+        (["reconstruction", "--readings", "3"], "readings: 3; allowed"),
+        (["reconstruction", "--confirm", "0"], "confirm: 0; allowed"),
+        (["multiverse", "--confirm", "5"], "name: 'multiverse'; allowed: reconstruction, for which alone --confirm"),
+        (["fig6", "--readings", "5"], "name: 'fig6'; allowed: multiverse or reconstruction"),
+    ],
+)
+def test_bad_efforts_are_refused(flags, message, tmp_path, capsys):
+    assert main(["run", *flags, "--smoke", "--out", str(tmp_path)]) == 2
+    assert message in capsys.readouterr().err
+    assert not any(tmp_path.iterdir())
+
+
+def test_the_usual_effort():
+    assert effort_of(None, None, smoke=False) == Effort(336, 100, 3, PER_BLOCK)
+
+
+@pytest.mark.slow
+def test_a_tiny_search_runs_from_the_command_to_a_preset(tmp_path):
+    run = ["run", "reconstruction", "--smoke", "--episodes", "1", "--out", str(tmp_path)]
+    assert main(run) == 0
+    preset_of(str(tmp_path / "reconstruction" / "summary" / reconstruction.PRESET))
+    assert main([*run, "--resume"]) == 0
