@@ -15,7 +15,7 @@ import tyro
 from jrcjax.files import write_text
 from sweeps.options import FLAGS, File
 
-NAMES = ("throughput", "scaling", "limit", "canary", "start", "sum_tree", "paper", "vector")
+NAMES = ("throughput", "scaling", "limit", "canary", "start", "sum_tree", "paper", "vector", "accelerator")
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,8 @@ class Options:
     names: Annotated[
         tyro.conf.Positional[tuple[str, ...]], tyro.conf.arg(metavar="[NAME ...]", help_behavior_hint="")
     ] = ()
-    """Benchmarks to run: throughput, scaling, limit, canary, start, sum_tree, paper, vector. Default: throughput."""
+    """Benchmarks to run: throughput, scaling, limit, canary, start, sum_tree, paper, vector, accelerator.
+    Default: throughput."""
     json: File = None
     """File for machine and results."""
     quick: bool = False

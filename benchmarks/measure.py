@@ -8,6 +8,7 @@ from __future__ import annotations
 import multiprocessing
 import resource
 import statistics
+import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
@@ -52,7 +53,7 @@ class Result:
     compile_s: float
     """Tracing and compiling, with no cache on disk."""
     peak_rss_mb: float
-    """Largest resident memory, of all processes of the case."""
+    """Largest resident memory, of all processes of the case; on an accelerator the largest memory there."""
     steps_per_agent: int
     """In one repetition."""
     us_each: tuple[float, ...]
@@ -83,6 +84,15 @@ def _digits(value: float) -> str:
     return f"{value:.3f}" if value < 1 else f"{value:.2f}" if value < 100 else f"{value:.0f}"
 
 
+def _peak_mb() -> float:
+    """Peak memory of this process: an accelerator's if it has used one, else resident memory."""
+    if jax := sys.modules.get("jax"):
+        of_device = jax.devices()[0].memory_stats() if jax.default_backend() != "cpu" else None
+        if of_device:
+            return of_device["peak_bytes_in_use"] / 2**20
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
 def _serve(pipe: Connection, case: Case) -> None:
     """In a process of its own: gets the case ready, then times a repetition whenever it is asked to."""
     try:
@@ -96,7 +106,7 @@ def _serve(pipe: Connection, case: Case) -> None:
         begin = time.perf_counter()
         ready.advance()
         seconds = time.perf_counter() - begin
-        pipe.send((seconds, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024))
+        pipe.send((seconds, _peak_mb()))
 
 
 class Running:

@@ -2,7 +2,7 @@
 
 XLA runs one batched program on a CPU mostly on one core. With one device per core and the agents shared between them
 both cores work, and blocks of fixed size keep each block's memory in the cache and its compiled code the same whatever
-the number of agents.
+the number of agents. An accelerator is one device with larger blocks.
 """
 
 from __future__ import annotations
@@ -26,7 +26,9 @@ from jrcjax.checks import refuse
 from jrcjax.machine import usable_cores
 
 BLOCK = 16
-"""Agents that one device advances at once."""
+"""Agents that one CPU device advances at once: their memory stays in the cache."""
+ACCELERATOR_BLOCK = 4096
+"""The most that an accelerator advances at once: a slot takes about as long for one agent as for thousands."""
 _XLA_FLAGS = {
     # Loops over 24 or 32 numbers stay loops, which LLVM turns into vector instructions; unrolled they would be scalar.
     # What several loops read is computed once, in one loop with several results.
@@ -104,15 +106,24 @@ def mesh(devices: int) -> Mesh:
     return Mesh(np.array(jax.devices()[:devices]), ("agents",), axis_types=(AxisType.Auto,))
 
 
-def devices_for(count: int, block: int = BLOCK) -> int:
+def block_for(count: int) -> int:
+    """Agents that one device advances at once, of so many: on an accelerator a power of two that holds its share."""
+    if jax.default_backend() == "cpu":
+        return BLOCK
+    share = -(-count // jax.device_count())
+    return min(1 << (share - 1).bit_length(), ACCELERATOR_BLOCK)
+
+
+def devices_for(count: int, block: int | None = None) -> int:
     """Devices that work on so many agents: no more than take part in every round of blocks, and two if there are."""
-    blocks, available = -(-count // block), jax.device_count()
+    blocks, available = -(-count // (block or block_for(count))), jax.device_count()
     rounds = -(-blocks // available)
     return min(max(-(-blocks // rounds), 2), available)
 
 
-def padded(count: int, block: int = BLOCK) -> int:
+def padded(count: int, block: int | None = None) -> int:
     """The number of agents that `over_agents` works with for `count` of them: a multiple of block times devices."""
+    block = block or block_for(count)
     unit = block * devices_for(count, block)
     return -(-count // unit) * unit
 
@@ -132,17 +143,18 @@ def groups(tree: Any) -> list[Any]:
     A function compiled for such a group is the same code for any number of agents, and so are an agent's bits.
     """
     count = jax.tree.leaves(tree)[0].shape[0]
-    size = BLOCK * devices_for(count)
+    size = block_for(count) * devices_for(count)
     whole = pad_agents(tree, padded(count))
     return [jax.tree.map(lambda leaf, i=i: leaf[i : i + size], whole) for i in range(0, padded(count), size)]
 
 
-def over_agents(function: Callable, block: int = BLOCK, *, in_place: bool = False) -> Callable:
+def over_agents(function: Callable, block: int | None = None, *, in_place: bool = False) -> Callable:
     """`function(shared, agents)` of one agent as a compiled function of many.
 
     Args:
       function: pure; `shared` is the same for all agents, `agents` a pytree of one agent's values.
-      block: agents that one device advances at once; more of them for functions that do little per agent.
+      block: agents that one device advances at once, `block_for` their number if None; more where little is done per
+        agent.
       in_place: for a function that returns (agents, result): the new agents take the memory of the old ones, which are
         gone after the call.
 
@@ -154,23 +166,25 @@ def over_agents(function: Callable, block: int = BLOCK, *, in_place: bool = Fals
     along, everywhere = PartitionSpec("agents"), PartitionSpec()
     of_block = jax.vmap(function, in_axes=(None, 0))
 
-    def on_one_device(shared, agents):
-        blocks = jax.tree.leaves(agents)[0].shape[0] // block
+    def on_one_device(size, shared, agents):
+        blocks = jax.tree.leaves(agents)[0].shape[0] // size
         # A single block needs no loop, which would copy the agents' memory in and out.
         if blocks == 1:
             return of_block(shared, agents)
         if in_place:
             return _in_place(of_block, shared, agents, blocks)
-        split = jax.tree.map(lambda a: a.reshape(blocks, block, *a.shape[1:]), agents)
+        split = jax.tree.map(lambda a: a.reshape(blocks, size, *a.shape[1:]), agents)
         return _joined(jax.lax.map(lambda agents: of_block(shared, agents), split))
 
     def checked(shared, agents):
         count = jax.tree.leaves(agents)[0].shape[0]
-        devices = devices_for(count, block)
-        if count % (block * devices):
-            refuse("agents", count, f"a multiple of {block} agents x {devices} devices")
+        size = block or block_for(count)
+        devices = devices_for(count, size)
+        if count % (size * devices):
+            refuse("agents", count, f"a multiple of {size} agents x {devices} devices")
         specs = {"in_specs": (everywhere, along), "out_specs": along}
-        return jax.shard_map(on_one_device, mesh=mesh(devices), **specs, check_vma=False)(shared, agents)
+        of_device = functools.partial(on_one_device, size)
+        return jax.shard_map(of_device, mesh=mesh(devices), **specs, check_vma=False)(shared, agents)
 
     return jax.jit(checked, donate_argnums=1 if in_place else ())
 

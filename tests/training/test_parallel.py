@@ -65,6 +65,28 @@ def test_all_devices_take_an_equal_share(blocks):
     assert shares == dict.fromkeys(jax.devices(), (blocks * parallel.BLOCK,))
 
 
+@pytest.mark.parametrize(("count", "block"), [(1, 1), (3, 2), (64, 32), (100, 64), (5000, 4096), (32768, 4096)])
+def test_blocks_of_an_accelerator_hold_its_share(monkeypatch, count, block):
+    """Devices of this machine stand for two accelerators: an agent's numbers are those of a CPU's blocks."""
+    monkeypatch.setattr(parallel, "devices_for", lambda count, block=None: 2)
+    monkeypatch.setattr(jax, "device_count", lambda: 2)
+    agents = jnp.arange(float(count))
+    wanted = 3.0 * agents + 1.0
+    monkeypatch.setattr(jax, "default_backend", lambda: "gpu")
+    assert parallel.block_for(count) == block
+    lanes = parallel.padded(count)
+    assert lanes % (2 * block) == 0
+    assert lanes < count + 2 * block
+    assert parallel.block_for(lanes) == block  # the padded agents are worked on in the same blocks
+    whole = parallel.pad_agents(agents, lanes)
+    triple = parallel.over_agents(lambda one, agent: 3.0 * agent + one)
+    np.testing.assert_array_equal(triple(1.0, whole)[:count], wanted)
+    of_groups = [triple(1.0, group) for group in parallel.groups(agents)]
+    np.testing.assert_array_equal(np.concatenate(of_groups)[:count], wanted)
+    in_place = parallel.over_agents(lambda one, agent: (3.0 * agent + one, agent), in_place=True)
+    np.testing.assert_array_equal(in_place(1.0, jnp.copy(whole))[0][:count], wanted)
+
+
 def test_agents_are_refused_unless_they_fill_blocks():
     with pytest.raises((ValueError, TypeError)):
         parallel.over_agents(lambda shared, agent: agent)(0, jnp.arange(UNIT + 1))
