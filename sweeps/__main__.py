@@ -13,7 +13,7 @@ from typing import Annotated
 
 import tyro
 
-from jrcjax.checks import refuse
+from jrcjax.checks import refuse, require_integer
 from sweeps import interrupts
 from sweeps.command import begin
 from sweeps.options import FLAGS, Count, Preset
@@ -52,6 +52,8 @@ class Run:
     """Address of a Dask scheduler whose workers compute, such as tcp://host:8786."""
     workers: int | None = None
     """Compute in so many processes on this machine, as a local Dask cluster."""
+    wait: Annotated[int, tyro.conf.arg(metavar="SECONDS")] = 300
+    """How long to wait for workers of a cluster that has none."""
     readings: Count = None
     """Of the multiverse and of the reconstruction, how many readings of the paper. Default: 512 and 336, or 2 and 4
     with --smoke."""
@@ -112,7 +114,8 @@ def _run(command: Command) -> int:
     size = size_of(command.seeds, command.episodes, preset, command.smoke, study)
     size.check()
     sweeps = study.smoke_sweeps if command.smoke and study.smoke_sweeps else study.sweeps
-    options = {"resume": command.resume, "save_agents": command.save_agents}
+    require_integer("wait", command.wait, 0)
+    options = {"resume": command.resume, "save_agents": command.save_agents, "patience": command.wait}
     with interrupts.terminable(), _client(command) as client:
         run = functools.partial(run_sweep, size=size, out=command.out, console=console, **options, client=client)
         if study.search:

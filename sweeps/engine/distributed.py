@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 import os
 import re
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -28,10 +29,12 @@ from jrcjax.training import parallel
 from sweeps.engine.block import Block, compute, source_in
 from sweeps.engine.job import Job
 from sweeps.engine.sources import kept_sources, missing_sources
+from sweeps.engine.workers import SAME_CHECKOUT, Watch
 from sweeps.results import store
 from sweeps.sweep import Size, Sweep
 
 _LOST_WORKERS = 10  # that one block may have before the run gives up
+_POLL = 0.2  # seconds between two looks at tasks and workers
 
 _ADDRESS = "the address of a running scheduler, such as tcp://host:8786"
 
@@ -71,7 +74,7 @@ def client_of(scheduler: str | None, workers: int | None) -> Iterator[Any]:
         yield client
 
 
-def compute_blocks(client: Any, job: Job, out: Path, todo: list[range]) -> Iterator[Block]:
+def compute_blocks(client: Any, job: Job, out: Path, todo: list[range], patience: float) -> Iterator[Block]:
     """Computes blocks of seeds on a cluster, and keeps the source agents that workers had to train.
 
     Args:
@@ -79,12 +82,19 @@ def compute_blocks(client: Any, job: Job, out: Path, todo: list[range]) -> Itera
       job: what to run.
       out: the folder with the results of all sweeps.
       todo: the blocks.
+      patience: seconds without any worker after which the run gives up.
 
     Yields:
       The blocks as they come in.
-    """
-    from distributed import as_completed
 
+    Raises:
+      TimeoutError: when no worker comes, or none comes back.
+      ValueError: if a worker lacks a module of this project.
+      OSError: if a block is lost with one worker after the other.
+    """
+    watch = Watch(client, patience)
+    while not watch.look():
+        time.sleep(_POLL)
     share_of = len(client.cluster.workers) if client.cluster else None  # those of this machine share its cores
     tasks = []
     for seeds in todo:
@@ -93,8 +103,8 @@ def compute_blocks(client: Any, job: Job, out: Path, todo: list[range]) -> Itera
             source = client.scatter(jax.tree.map(np.asarray, kept_sources(job.source, seeds, out)))
         asked = _Asked(job.sweep, job.size, seeds, share_of, command())
         tasks.append(client.submit(_made, asked, source, pure=False))
-    for done in as_completed(tasks, loop=client.loop):
-        made = done.result()
+    for done in _as_they_come(client, tasks, watch):
+        made = _result_of(done)
         if made.sources is not None:
             assert job.source
             folder = out / job.source.sweep.name
@@ -102,6 +112,31 @@ def compute_blocks(client: Any, job: Job, out: Path, todo: list[range]) -> Itera
                 store.add_part(folder, made.block.seeds, made.sources)
         done.release()
         yield made.block
+
+
+def _as_they_come(client: Any, tasks: list[Any], watch: Watch) -> Iterator[Any]:
+    """Tasks as they end, while somebody looks at the workers."""
+    from distributed import as_completed
+
+    coming = as_completed(tasks, loop=client.loop)
+    while not coming.is_empty():
+        if coming.has_ready():
+            yield next(coming)
+        else:
+            watch.look()
+            time.sleep(_POLL)
+
+
+def _result_of(task: Any) -> _Made:
+    from distributed import KilledWorker
+
+    try:
+        return task.result()
+    except KilledWorker as error:
+        text = f"a block was lost with {_LOST_WORKERS} workers, one after the other; their logs say why they ended"
+        raise OSError(text) from error
+    except ModuleNotFoundError as error:  # of a worker that had its task before it was looked at
+        refuse("workers", f"one without {error.name}", SAME_CHECKOUT)
 
 
 class _Asked(NamedTuple):

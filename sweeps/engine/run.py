@@ -67,6 +67,7 @@ def run_sweep(
     resume: bool,
     save_agents: bool = False,
     client: Any = None,
+    patience: float = 300.0,
 ) -> Path:
     """Runs what is missing of a sweep.
 
@@ -78,6 +79,7 @@ def run_sweep(
       resume: continue in a folder that holds results of the same configuration.
       save_agents: save the trained agents beside the results.
       client: of the Dask cluster that computes (see `sweeps.engine.distributed`); this process if None.
+      patience: seconds to wait for workers of a cluster that has none.
 
     Returns:
       The folder with the results.
@@ -86,6 +88,7 @@ def run_sweep(
       ValueError: bad sizes, more than this machine can hold, or a folder that already holds results, or holds some
         without their agents.
       FolderInUse: if another process writes to the folder.
+      TimeoutError: if a cluster has no worker.
     """
     size.check()
     job, folder = Job(sweep, size), out / sweep.name
@@ -107,7 +110,7 @@ def run_sweep(
             if client is None:
                 _run_here(job, out, console, seconds, save_agents)
             else:
-                _run_on_cluster(client, job, out, console, save_agents)
+                _run_on_cluster(client, job, out, console, save_agents, patience)
         except (KeyboardInterrupt, OSError):
             saved = store.in_words(store.finished_seeds(folder))
             held = f"seeds {saved}" if saved else "nothing yet"
@@ -153,13 +156,13 @@ def _run_here(job: Job, out: Path, console: Console, seconds: float, save_agents
             save(shown.compute(job, seeds, source), job, out, save_agents)
 
 
-def _run_on_cluster(client: Any, job: Job, out: Path, console: Console, save_agents: bool) -> None:
+def _run_on_cluster(client: Any, job: Job, out: Path, console: Console, save_agents: bool, patience: float) -> None:
     """The same on a cluster; the progress counts seeds, over all workers."""
     from sweeps.engine import distributed  # which needs an extra
 
     todo = to_do(job, out)
     with progress.shown(console, f"{job.sweep.name} on a cluster", sum(map(len, todo))) as told:
-        for block in distributed.compute_blocks(client, job, out, todo):
+        for block in distributed.compute_blocks(client, job, out, todo, patience):
             save(block, job, out, save_agents)
             told(len(block.seeds))
 

@@ -5,15 +5,17 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import xarray as xr
 
 from jrcjax import load_agent
-from jrcjax.provenance import command
+from jrcjax.provenance import command, version_of
 from sweeps.__main__ import main
 from sweeps.engine.distributed import share
+from sweeps.engine.workers import Watch
 from sweeps.results import parts, store
 from sweeps.results.agents import agents_path
 
@@ -61,6 +63,78 @@ def test_a_sweep_that_transfers_runs_on_a_scheduler_that_is_there(tmp_path):
     for name in ("fig9", "source"):
         local, dask = (store.load(tmp_path / where / name, 2) for where in ("local", "dask"))
         xr.testing.assert_equal(local, dask)
+
+
+class Cluster:
+    """A client of a cluster whose workers are told, one set for each look."""
+
+    scheduler = SimpleNamespace(address="tcp://here:1")
+
+    def __init__(self, *looks: tuple[str, ...], versions: dict | None = None, lacking: tuple[str, ...] = ()):
+        self._looks, self._versions, self._lacking = list(looks), versions or {}, list(lacking)
+
+    def nthreads(self) -> dict[str, int]:
+        return dict.fromkeys(self._looks.pop(0), 1)
+
+    def run(self, function, workers, on_error):
+        return dict.fromkeys(workers, self._lacking or function())
+
+    def get_versions(self, packages):
+        return {"workers": {"a": {"packages": {p: self._versions.get(p, version_of(p)) for p in packages}}}}
+
+
+def test_waiting_for_workers_is_told_and_ends():
+    said, times = [], iter([0.0, 10.0, 31.0, 50.0, 70.0, 200.0])
+    watch = Watch(Cluster((), (), (), ("a", "b"), (), (), ()), 100.0, said.append, clock=lambda: next(times))
+    assert [watch.look() for _ in range(6)] == [0, 0, 0, 2, 0, 0]
+    assert said == [
+        "workers: none at tcp://here:1; waiting for one, 100 s at most",
+        "workers: none at tcp://here:1; waiting for one, 69 s at most",
+        "workers: 2",
+        "workers: none at tcp://here:1; waiting for one, 100 s at most",
+    ]
+    with pytest.raises(TimeoutError, match=r"no worker came to tcp://here:1 within 100 s; start some.*--wait"):
+        watch.look()
+
+
+def test_versions_of_workers_that_differ_are_told():
+    said = []
+    Watch(Cluster(("a",), versions={"jax": "0.1"}), 1.0, said.append).look()
+    assert said == [f"warning: jax is {version_of('jax')} here, 0.1 on workers; numbers may differ", "workers: 1"]
+
+
+def test_a_worker_without_the_project_is_refused():
+    with pytest.raises(ValueError, match="workers: 'a lacks jrcjax and sweeps'; allowed: workers started"):
+        Watch(Cluster(("a",), lacking=("jrcjax", "sweeps")), 1.0).look()
+
+
+_LACKING = """
+import asyncio, sys
+sys.modules["sweeps"] = None  # as where it is not installed
+from distributed import Worker
+
+async def work():
+    async with Worker(sys.argv[1], dashboard=False) as worker:
+        await worker.finished()
+
+asyncio.run(work())
+"""
+
+
+@pytest.mark.slow
+def test_a_cluster_without_workers_or_with_others_ends_the_command(tmp_path, capsys):
+    distributed = pytest.importorskip("distributed", reason="the extra dask is not installed")
+    with distributed.LocalCluster(n_workers=0, dashboard_address=":0") as cluster:
+        address = cluster.scheduler_address
+        run = [*ARGUMENTS, "--scheduler", address, "--out", str(tmp_path)]
+        assert main([*run, "--wait", "0"]) == 2
+        assert f"error: no worker came to {address} within 0 s" in capsys.readouterr().err
+        with subprocess.Popen([sys.executable, "-c", _LACKING, address], stderr=subprocess.DEVNULL) as worker:
+            try:
+                assert main(run) == 2
+                assert "lacks sweeps'; allowed: workers started in a checkout like this one" in capsys.readouterr().err
+            finally:
+                worker.kill()
 
 
 @pytest.mark.parametrize(
