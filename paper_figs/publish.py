@@ -2,6 +2,8 @@
 
     python -m paper_figs.publish --figures out --robustness OUT/robustness/summary
 
+and the same for --multiverse and --reconstruction.
+
 Without options the texts alone are renewed.
 """
 
@@ -27,6 +29,8 @@ from sweeps.sweep import Size
 
 ROOT = Path(__file__).parents[1]
 TABLES = ("claims.json", "regret.csv", "seeds_needed.csv")
+STUDIES = ("robustness", "multiverse", "reconstruction")
+"""Whose summaries are published as they are."""
 _TEXTS = ("*.md", "paper_figs/*.md", "docs/**/*.md")
 
 
@@ -38,6 +42,10 @@ class Options:
     """Folder that `make figures` wrote, with all figures at the paper's size."""
     robustness: Folder = None
     """Folder with the summary of a robustness study."""
+    multiverse: Folder = None
+    """Folder with the summary of a multiverse."""
+    reconstruction: Folder = None
+    """Folder with the summary of a reconstruction."""
     root: Folder = ROOT
     """Folder of the project."""
 
@@ -96,10 +104,9 @@ def main(args: list[str] | None = None) -> int:
     try:
         if options.figures:
             written += publish_figures(options.figures, root / "published" / "figures")
-        if options.robustness:
-            target = root / "published" / "robustness"
-            shutil.copytree(options.robustness, target, dirs_exist_ok=True)
-            written.append(target)
+        for name in STUDIES:
+            if summary := getattr(options, name):
+                written.append(Path(shutil.copytree(summary, root / "published" / name, dirs_exist_ok=True)))
         written += renew_texts(root)
     except (ValueError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)

@@ -10,24 +10,25 @@ import functools
 import json
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from paper_figs import readings_text
 from paper_figs.claims import words
 from paper_figs.claims.judge import VERDICTS, Judgement, from_json
 from paper_figs.claims.learning_table import LABELS
 from paper_figs.claims.table import TITLES, number_of
+from paper_figs.markdown import listed, percent, table, wrapped
 
 FIGURES, ROBUSTNESS, CALIBRATION = "figures", "robustness", "calibration"
 """Folders of published results: of `make figures`, of the robustness study, and of `paper_figs.calibration`."""
 _BEGIN = "<!-- made by python -m paper_figs.publish: {name} -->"
 _END = "<!-- end of {name} -->"
 _ANY = re.compile(r"<!-- made by python -m paper_figs\.publish: (\S+) -->\n(.*?)<!-- end of \1 -->", re.DOTALL)
-_WIDTH = 120
 
 
 def renewed(text: str, published: Path) -> str:
@@ -59,29 +60,6 @@ def _numbers(published: Path) -> dict[str, dict[str, Any]]:
     return json.loads((published / FIGURES / "numbers.json").read_text(encoding="utf-8"))
 
 
-def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
-    return "\n".join("| " + " | ".join(row) + " |" for row in (head, ("---",) * len(head), *rows))
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.3g} %"
-
-
-def _listed(items: Iterable[str]) -> str:
-    """Sentences as a list, wrapped."""
-    return "\n".join(_wrapped(item) for item in items)
-
-
-def _wrapped(item: str) -> str:
-    lines, line = [], "-"
-    for word in item.split():
-        if len(line) + len(word) + 1 > _WIDTH:
-            lines.append(line)
-            line = " "
-        line += f" {word}"
-    return "\n".join([*lines, line])
-
-
 # --- verdicts ---------------------------------------------------------------------------------------------------------
 
 
@@ -93,7 +71,7 @@ def claims_table(found: list[Judgement], figure: str) -> str:
         for j in found
         if j.figure.startswith(figure)
     ]
-    return _table(head, rows)
+    return table(head, rows)
 
 
 def _in_short(parts: list[Judgement]) -> str:
@@ -111,7 +89,7 @@ def verdicts_table(published: Path) -> str:
     for number, title in TITLES.items():
         parts = [j for j in found if number_of(j.claim) == number]
         rows.append((number, title, _in_short(parts)))
-    return _table(("", "the paper says", f"here ({found[0].n_seeds} seeds)"), rows)
+    return table(("", "the paper says", f"here ({found[0].n_seeds} seeds)"), rows)
 
 
 def supported_list(published: Path) -> str:
@@ -124,25 +102,25 @@ def supported_list(published: Path) -> str:
     ]
     same = [j.claim for j in found if j.negligible]
     sentences.append(f"**Negligible differences**, interval included: {'; '.join(same) or 'none'}.")
-    return _listed(sentences)
+    return listed(sentences)
 
 
 # --- sentences --------------------------------------------------------------------------------------------------------
 
 
 def _gaps_of(numbers: dict[str, Any], when: str, names: tuple[str, ...]) -> str:
-    return ", ".join(f"{LABELS[name]} {_percent(numbers[f'{when}_gap_{name}'])}" for name in names)
+    return ", ".join(f"{LABELS[name]} {percent(numbers[f'{when}_gap_{name}'])}" for name in names)
 
 
 def source_list(published: Path) -> str:
     """What else is to be said of Fig. 5(a)."""
     n, names = _numbers(published)["fig5a"], ("ddqn", "q_learning")
     tolerances = ", ".join(
-        f"at {_percent(t)} C1 (reached) is {n[f'c1_at_{t:g}']} and C2 (Q-learning, source) {n[f'c2_at_{t:g}']}"
+        f"at {percent(t)} C1 (reached) is {n[f'c1_at_{t:g}']} and C2 (Q-learning, source) {n[f'c2_at_{t:g}']}"
         for t in (0.01, 0.03, 0.05)
     )
     constant = (
-        f"The best action that ignores the state earns {n['constant']:g} per slot, {_percent(n['constant_gap'])} below "
+        f"The best action that ignores the state earns {n['constant']:g} per slot, {percent(n['constant_gap'])} below "
         f"the optimum of {n['optimum']:g}, which transmits in {n['states_that_transmit']:g} of the 32 states."
     )
     explored = f"With the last random actions left in, the optimal policy earns {n['explored']:g}."
@@ -151,9 +129,9 @@ def source_list(published: Path) -> str:
     verdicts = f"The verdicts depend on the gap that counts as optimal: {tolerances}."
     noisy = (
         f"A single snapshot is noisy: values are near {n['mean_value']:g} and their differences some units. "
-        f"{_percent(n['snapshots_beyond'])} of DDQN's snapshots after episode 400 are more than 5 % below the optimum."
+        f"{percent(n['snapshots_beyond'])} of DDQN's snapshots after episode 400 are more than 5 % below the optimum."
     )
-    return _listed([constant, explored, of_learners, verdicts, noisy])
+    return listed([constant, explored, of_learners, verdicts, noisy])
 
 
 def target_list(published: Path) -> str:
@@ -165,8 +143,8 @@ def target_list(published: Path) -> str:
         f"Mean gaps after the first episode: {_gaps_of(n, 'first', names)}; in episodes 51 to 100: "
         f"{_gaps_of(n, 'early', names)}; after episode 400: {_gaps_of(n, 'late', names)}."
     )
-    constant = f"The best action that ignores the state has a gap of {_percent(n['constant_gap'])}."
-    return _listed([of_learners, constant, f"Packets per episode: {sent}. Miss detection: {missed}."])
+    constant = f"The best action that ignores the state has a gap of {percent(n['constant_gap'])}."
+    return listed([of_learners, constant, f"Packets per episode: {sent}. Miss detection: {missed}."])
 
 
 def points_list(figure: str, published: Path) -> str:
@@ -181,12 +159,12 @@ def points_list(figure: str, published: Path) -> str:
     lead = (reward.tlwd - reward[["dpr", "ddqn"]].max(axis=1)) / reward.optimum.abs()
     sentences = [
         f"Points of {len(rivals)} at which the mean reward is the highest and the lowest: {ranks}.",
-        f"TLwD's lead over the better of the others lies between {_percent(lead.min())} and {_percent(lead.max())} "
+        f"TLwD's lead over the better of the others lies between {percent(lead.min())} and {percent(lead.max())} "
         "of the optimum.",
-        f"The best policy that ignores the state misses at most {_percent((1 - miss.constant / miss.ddqn).max())} less "
+        f"The best policy that ignores the state misses at most {percent((1 - miss.constant / miss.ddqn).max())} less "
         "than DDQN at any point.",
     ]
-    return _listed(sentences)
+    return listed(sentences)
 
 
 def headline(published: Path) -> str:
@@ -201,7 +179,7 @@ def headline(published: Path) -> str:
         f"{verdict['C5 (highest)']} in Fig. 6 and {verdict['C13 (highest)']} in Fig. 8. After episode 400 the policies "
         f"in the target are below the exact optimum by: {_gaps_of(numbers, 'late', ('tlwd', 'dpr', 'ddqn'))}."
     )
-    return _wrapped(text)[2:].replace("\n  ", "\n")
+    return wrapped(text)[2:].replace("\n  ", "\n")
 
 
 def robustness_list(published: Path) -> str:
@@ -216,24 +194,21 @@ def robustness_list(published: Path) -> str:
     )
     pairs = better.set_index(["algorithm", "other"])
     wins = ", ".join(
-        f"{LABELS[a]} over {LABELS[b]} {_percent(row.probability)} ({100 * row.low:.3g} to {100 * row.high:.3g})"
+        f"{LABELS[a]} over {LABELS[b]} {percent(row.probability)} ({100 * row.low:.3g} to {100 * row.high:.3g})"
         for a, b in (("tlwd", "ddqn"), ("dpr", "ddqn"))
         for row in [pairs.loc[(a, b)]]
     )
     by_reward = wrong.query("environment == 'target' and score == 'reward'").set_index("study_seeds").misranking
-    misled = ", ".join(f"{n} seeds {_percent(by_reward[n])}" for n in by_reward.index)
-    reached = ", ".join(f"{LABELS[name]} {_percent(target.reached[name])}" for name in ("tlwd", "dpr", "ddqn"))
+    misled = ", ".join(f"{n} seeds {percent(by_reward[n])}" for n in by_reward.index)
+    reached = ", ".join(f"{LABELS[name]} {percent(target.reached[name])}" for name in ("tlwd", "dpr", "ddqn"))
     stays = "median_episodes_low" in target  # tables of older versions count runs that leave again
-    return (
-        f"{target.n_seeds.max()} seeds ([tables](published/robustness)) say of the target environment:\n\n"
-        + _listed(
-            [
-                *([f"Runs that get within 5 % of the optimum and stay there: {reached}."] if stays else []),
-                f"Exact regret per slot of the last policy: {lost}.",
-                f"Probability that a run earns more than another learner's: {wins}.",
-                f"How often a smaller study ranks the four learners by reward differently than all seeds: {misled}.",
-            ]
-        )
+    return f"{target.n_seeds.max()} seeds ([tables](published/robustness)) say of the target environment:\n\n" + listed(
+        [
+            *([f"Runs that get within 5 % of the optimum and stay there: {reached}."] if stays else []),
+            f"Exact regret per slot of the last policy: {lost}.",
+            f"Probability that a run earns more than another learner's: {wins}.",
+            f"How often a smaller study ranks the four learners by reward differently than all seeds: {misled}.",
+        ]
     )
 
 
@@ -248,17 +223,17 @@ def calibration_list(published: Path) -> str:
     )
     sentences = [
         f"In {len(inside)} of {len(rows)} rows (a rule, a world, a number of seeds) false verdicts of a kind come in "
-        f"at most {_percent(inside.false.max())} of studies, and intervals hold the truth in "
-        f"{_percent(inside.coverage.min())} to {_percent(inside.coverage.max())}.",
+        f"at most {percent(inside.false.max())} of studies, and intervals hold the truth in "
+        f"{percent(inside.coverage.min())} to {percent(inside.coverage.max())}.",
         f"In {len(wide)} rows intervals are wider than they need be; false verdicts come in at most "
-        f"{_percent(wide.false.max())}.",
+        f"{percent(wide.false.max())}.",
     ]
     for rule, world in dict.fromkeys(zip(beyond.rule, beyond.world, strict=True)):
         here = beyond[(beyond.rule == rule) & (beyond.world == world)]
-        worst = ", ".join(f"{n} seeds {_percent(false)}" for n, false in zip(here.n_seeds, here.false, strict=True))
+        worst = ", ".join(f"{n} seeds {percent(false)}" for n, false in zip(here.n_seeds, here.false, strict=True))
         since = f"in reach from {here.in_reach_from.iloc[0]} seeds"
         sentences.append(f"Out of reach: {rule}, {world}: {worst}; {here.reason.iloc[0]}; {since}.")
-    return _listed(sentences)
+    return listed(sentences)
 
 
 BLOCKS: dict[str, Callable[[Path], str]] = {
@@ -274,5 +249,6 @@ BLOCKS: dict[str, Callable[[Path], str]] = {
     **{figure: functools.partial(points_list, figure) for figure in ("fig6", "fig7", "fig8")},
     "robustness": robustness_list,
     "calibration": calibration_list,
+    **readings_text.BLOCKS,
 }
 """Name of a marked part to what makes it from the folder of published results."""

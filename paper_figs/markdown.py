@@ -1,0 +1,33 @@
+"""Markdown from numbers: tables, lists and shares."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+_WIDTH = 120
+
+
+def table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+    """A table with a heading."""
+    return "\n".join("| " + " | ".join(row) + " |" for row in (head, ("---",) * len(head), *rows))
+
+
+def percent(share: float) -> str:
+    """A share in per cent."""
+    return f"{100 * share:.3g} %"
+
+
+def listed(items: Iterable[str]) -> str:
+    """Sentences as a list, wrapped."""
+    return "\n".join(wrapped(item) for item in items)
+
+
+def wrapped(item: str) -> str:
+    """A list's item in lines of the usual width."""
+    lines, line = [], "-"
+    for word in item.split():
+        if len(line) + len(word) + 1 > _WIDTH:
+            lines.append(line)
+            line = " "
+        line += f" {word}"
+    return "\n".join([*lines, line])

@@ -1,0 +1,129 @@
+"""The parts of texts that are made from published results under many readings of the paper."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pandas as pd
+
+from paper_figs.markdown import listed, percent, table
+from sweeps.studies.multiverse import MULTIVERSE
+from sweeps.studies.readings import READINGS, Reading, as_text, choices, default_unit, range_of, values_at
+from sweeps.studies.reconstruction import NAME as RECONSTRUCTION
+
+NAMED = ("C1 (about 200)", "C3 (TLwD)", "C5 (highest)", "C8 (miss detection, DDQN)", "C13 (highest)", "C15 (episodes)")
+"""Statements that the first page names."""
+_NEARLY_ALL = 0.9
+_DECIDING = 0.05  # least total-order index, from its lower limit, of a question that is said to decide
+
+
+def _csv(published: Path, study: str, name: str) -> pd.DataFrame:
+    return pd.read_csv(published / study / f"{name}.csv", keep_default_na=True)
+
+
+def _share(row: pd.Series, name: str) -> str:
+    return f"{percent(row[name])} ({100 * row[f'{name}_low']:.3g} to {100 * row[f'{name}_high']:.3g})"
+
+
+def _deciding(sensitivity: pd.DataFrame, claim: str, most: int = 3) -> str:
+    """The questions that decide a statement, with their total-order indices."""
+    of_claim = sensitivity[(sensitivity.claim == claim) & (sensitivity.total_low > _DECIDING)]
+    best = of_claim.sort_values("total", ascending=False).head(most)
+    return ", ".join(f"{row.input} {row.total:.2f}" for row in best.itertuples()) or "no single question"
+
+
+def readings_list(published: Path) -> str:
+    """In which share of the readings the statements hold, and what decides."""
+    claims, sensitivity = (_csv(published, MULTIVERSE.name, name) for name in ("claims", "sensitivity"))
+    number, by_name = int(claims.readings.max()), claims.set_index("claim")
+    everywhere, nowhere = claims[claims.holds_low > _NEARLY_ALL], claims[claims.holds_high < 1 - _NEARLY_ALL]
+    sentences = [
+        f"{name} holds in {_share(by_name.loc[name], 'holds')}; what decides it most (total-order index): "
+        f"{_deciding(sensitivity, name)}."
+        for name in NAMED
+    ]
+    sentences += [
+        f"In more than {percent(_NEARLY_ALL)} of the space, interval included, hold {len(everywhere)} of {len(claims)} "
+        f"statements: {'; '.join(everywhere.claim) or 'none'}.",
+        f"In less than {percent(1 - _NEARLY_ALL)} of it hold {len(nowhere)}: {'; '.join(nowhere.claim) or 'none'}.",
+    ]
+    return (
+        f"Shares of {number} readings ([tables](published/{MULTIVERSE.name})) in which the estimate is on the "
+        "statement's side, with 95 % intervals:\n\n" + listed(sentences)
+    )
+
+
+def decided_table(published: Path) -> str:
+    """One row per statement: where it holds, and what decides it."""
+    claims, sensitivity = (_csv(published, MULTIVERSE.name, name) for name in ("claims", "sensitivity"))
+    error = sensitivity.drop_duplicates("claim").set_index("claim").surrogate_error
+    rows = [
+        (
+            row.claim,
+            _share(row, "holds"),
+            _deciding(sensitivity, row.claim),
+            f"{error[row.claim]:.2f}" if row.claim in error.index else "",
+        )
+        for _, row in claims.iterrows()
+    ]
+    return table(("statement", "holds in (95 % interval)", "decided by (total-order index)", "error"), rows)
+
+
+def _searched(reading: Reading) -> str:
+    """Where a question's answers are searched, in words."""
+    where = range_of(reading)
+    if reading.where is None:
+        return ", ".join(choices(reading))
+    if where.levels:
+        return ", ".join(f"{as_text(reading.path, level)}" for level in where.levels)
+    return f"{where.low:g} to {where.high:g}{', logarithmic' if where.is_log else ''}"
+
+
+def questions_table(published: Path) -> str:
+    """One row per question: its field, its default, where it was searched, and which statement it decides most."""
+    sensitivity, default = _csv(published, MULTIVERSE.name, "sensitivity"), values_at(default_unit())
+    rows = []
+    for reading in READINGS:
+        of_question = sensitivity[sensitivity.input == reading.label].sort_values("total", ascending=False)
+        most = next(of_question.itertuples(), None)
+        decides = f"{most.claim}: {most.total:.2f} ({most.total_low:.2f} to {most.total_high:.2f})" if most else ""
+        value = as_text(reading.path, default[reading.path])
+        of_default = value if isinstance(value, str) else f"{value:g}"
+        rows.append((f"`{reading.path}`", reading.label, of_default, _searched(reading), decides))
+    return table(("field", "question", "default", "searched", "decides most (total-order index)"), rows)
+
+
+def reconstruction_list(published: Path) -> str:
+    """What the search for the best reading promised, and what fresh seeds gave."""
+    tried, confirmed = (_csv(published, RECONSTRUCTION, name) for name in ("tried", "confirmed"))
+    of_best = confirmed[[("all" in what.split()) for what in confirmed.best_for]]
+    best, default = tried.loc[tried.reading == of_best.reading.iloc[0]].iloc[0], tried[tried.reading == "default"]
+    searched = int(tried.reading.str.startswith("search").sum())
+    values = ", ".join(f"`{r.path}` {_short(best[r.path])}" for r in READINGS)
+    never = [claim for claim, held in confirmed.groupby("claim", sort=False).holds.any().items() if not held]
+    sentences = [
+        f"Of {len(tried)} readings, {searched} of them proposed by the search, {of_best.reading.iloc[0]} agrees best "
+        f"with the text: it promised {percent(best.agreement)}"
+        + (f" where the default has {percent(default.agreement.iloc[0])}" if len(default) else "")
+        + f", and {int(of_best.n_seeds.max())} fresh seeds gave {int(of_best.holds.sum())} of {len(of_best)} "
+        f"statements ({int((of_best.verdict == 'supported').sum())} supported, "
+        f"{int((of_best.verdict == 'contradicted').sum())} contradicted).",
+        f"That reading, a preset in [best.toml](published/{RECONSTRUCTION}/best.toml): {values}.",
+        f"Statements that fresh seeds found in none of the {confirmed.reading.nunique()} confirmed readings, each of "
+        f"which is the best for some claim: {'; '.join(never) or 'none'}.",
+    ]
+    return listed(sentences)
+
+
+def _short(value: object) -> str:
+    return value if isinstance(value, str) else f"{value:.3g}"
+
+
+BLOCKS: dict[str, Callable[[Path], str]] = {
+    "readings": readings_list,
+    "decided": decided_table,
+    "questions": questions_table,
+    "reconstruction": reconstruction_list,
+}
+"""Name of a marked part to what makes it from the folder of published results."""

@@ -1,0 +1,97 @@
+"""What texts say of many readings is what the published tables hold."""
+
+import pandas as pd
+import pytest
+
+from paper_figs import publish, readings_text, readme
+from sweeps.studies.readings import READINGS
+
+STEP, MARGIN = READINGS[0].label, "margin"
+
+
+@pytest.fixture
+def published(tmp_path):
+    """A multiverse in which C3 holds in half of 400 readings by the step size, and a search that finds half of it."""
+
+    def share(claim, holds):
+        limits = {"holds": holds, "holds_low": max(holds - 0.05, 0.0), "holds_high": min(holds + 0.05, 1.0)}
+        return {"claim": claim, "readings": 400} | limits
+
+    claims = [share(claim, 0.5) for claim in readings_text.NAMED] + [share("C2 (everywhere)", 0.99), share("C4", 0.01)]
+    index = {"first": 0.1, "first_low": 0.0, "first_high": 0.2, "surrogate": "gaussian", "surrogate_error": 0.25}
+    sensitivity = [
+        {"claim": "C3 (TLwD)", "input": STEP, "total": 0.8, "total_low": 0.7, "total_high": 0.9} | index,
+        {"claim": "C3 (TLwD)", "input": MARGIN, "total": 0.2, "total_low": 0.01, "total_high": 0.3} | index,
+    ]
+    tried = [
+        {"reading": name, "agreement": agreement} | {reading.path: 0.5 for reading in READINGS}
+        for name, agreement in (("default", 0.2), ("multiverse 3", 0.4), ("search 0", 0.6))
+    ]
+    confirmed = [
+        {
+            "reading": "search 0",
+            "best_for": "all C3",
+            "claim": claim,
+            "holds": holds,
+            "verdict": verdict,
+            "n_seeds": 100,
+        }
+        for claim, holds, verdict in (("C3 (TLwD)", True, "supported"), ("C4", False, "contradicted"))
+    ]
+    tables = {
+        "multiverse/claims": claims,
+        "multiverse/sensitivity": sensitivity,
+        "reconstruction/tried": tried,
+        "reconstruction/confirmed": confirmed,
+    }
+    for name, rows in tables.items():
+        file = tmp_path / f"{name}.csv"
+        file.parent.mkdir(exist_ok=True)
+        pd.DataFrame(rows).to_csv(file, index=False)
+    return tmp_path
+
+
+def test_shares_and_what_decides_are_those_of_the_tables(published):
+    text = " ".join(readings_text.readings_list(published).split())
+    assert "Shares of 400 readings" in text
+    assert f"- C3 (TLwD) holds in 50 % (45 to 55); what decides it most (total-order index): {STEP} 0.80." in text
+    assert "C5 (highest) holds in 50 % (45 to 55); what decides it most (total-order index): no single question" in text
+    assert "hold 1 of 8 statements: C2 (everywhere)." in text
+    assert "In less than 10 % of it hold 1: C4." in text
+
+
+def test_every_question_stands_in_one_table_by_field(published):
+    rows = readings_text.questions_table(published).splitlines()[2:]
+    assert [row.split("|")[1].strip().strip("`") for row in rows] == [reading.path for reading in READINGS]
+    step = next(row for row in rows if "hparams.learning_rate" in row)
+    assert "1e-06 to 0.01, logarithmic" in step
+    assert "C3 (TLwD): 0.80 (0.70 to 0.90)" in step
+    optimiser = next(row for row in rows if "config.optimiser" in row)
+    assert "adam" in optimiser
+    assert "sgd" in optimiser
+
+
+def test_every_statement_has_what_decides_it(published):
+    rows = readings_text.decided_table(published).splitlines()[2:]
+    assert len(rows) == len(readings_text.NAMED) + 2
+    assert f"| C3 (TLwD) | 50 % (45 to 55) | {STEP} 0.80 | 0.25 |" in rows
+
+
+def test_promise_and_confirmation_stand_side_by_side(published):
+    text = " ".join(readings_text.reconstruction_list(published).split())
+    assert "Of 3 readings, 1 of them proposed by the search, search 0 agrees best with the text" in text
+    assert "promised 60 % where the default has 20 %, and 100 fresh seeds gave 1 of 2 statements" in text
+    assert "(1 supported, 1 contradicted)" in text
+    assert "each of which is the best for some claim: C4." in text
+
+
+def test_studies_are_published_as_they_are(published, tmp_path):
+    root = tmp_path / "project"
+    mark = "<!-- made by python -m paper_figs.publish: questions -->\n<!-- end of questions -->\n"
+    root.mkdir()
+    (root / "README.md").write_text(mark)
+    options = [f"--{name}={published / name}" for name in ("multiverse", "reconstruction")]
+    assert publish.main([*options, f"--root={root}"]) == 0
+    assert (root / "published" / "reconstruction" / "tried.csv").is_file()
+    assert readme.renewed(mark, root / "published") == (root / "README.md").read_text()
+    assert "hparams.learning_rate" in (root / "README.md").read_text()
