@@ -96,7 +96,7 @@ def _differences(name: str) -> str:
     from jrcjax.training.rollout import init_agent, learner_for, run_episodes
 
     params, hparams = jrcjax.paper_params("source"), jrcjax.HParams()
-    config = jrcjax.Config(pretraining=0, replay_capacity=2000, episodes=1)
+    config = jrcjax.Config(pretraining=0, replay_capacity=2000, demonstrations=500, episodes=1)
     rule = learner_for(name, params, config)
 
     def one(key):
