@@ -27,6 +27,12 @@ def pin() -> None:
             jax.config.update(name, value)
 
 
+def pin_accelerator() -> None:
+    """Asks an accelerator for products of whole float32 numbers, which are shortened there by default."""
+    if jax.default_backend() != "cpu":
+        jax.config.update("jax_default_matmul_precision", "highest")
+
+
 def in_force() -> dict[str, Any]:
     """The settings in force now, and the platform that computes."""
     settings = {name.removeprefix("jax_"): getattr(jax.config, name, value) for name, value in PINNED.items()}

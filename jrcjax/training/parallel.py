@@ -28,7 +28,8 @@ from jrcjax.machine import usable_cores
 BLOCK = 16
 """Agents that one CPU device advances at once: their memory stays in the cache."""
 ACCELERATOR_BLOCK = 4096
-"""The most that an accelerator advances at once: a slot takes about as long for one agent as for thousands."""
+"""The most that an accelerator advances at once: beyond it a slot takes longer in proportion."""
+_WARP = 32
 _XLA_FLAGS = {
     # Loops over 24 or 32 numbers stay loops, which LLVM turns into vector instructions; unrolled they would be scalar.
     # What several loops read is computed once, in one loop with several results.
@@ -52,6 +53,7 @@ def start() -> None:
     except RuntimeError as error:
         asked = jax.config.jax_platforms or ""  # pyright: ignore[reportAttributeAccessIssue]
         refuse("JAX_PLATFORMS", asked, f"cpu, or a platform that works here ({str(error).splitlines()[0]})")
+    numerics.pin_accelerator()
 
 
 def use_all_cores() -> None:
@@ -107,11 +109,11 @@ def mesh(devices: int) -> Mesh:
 
 
 def block_for(count: int) -> int:
-    """Agents that one device advances at once, of so many: on an accelerator a power of two that holds its share."""
+    """Agents that one device advances at once, of so many: on an accelerator its share, in whole warps."""
     if jax.default_backend() == "cpu":
         return BLOCK
     share = -(-count // jax.device_count())
-    return min(1 << (share - 1).bit_length(), ACCELERATOR_BLOCK)
+    return min(-(-share // _WARP) * _WARP, ACCELERATOR_BLOCK)
 
 
 def devices_for(count: int, block: int | None = None) -> int:

@@ -20,8 +20,8 @@ from sweeps.preset import SOURCES, base_of
 
 SEED = 0
 """Of the sequences."""
-PER_BLOCK = 16
-"""Readings in a block."""
+PER_BLOCK = 64
+"""Readings in a block: a power of two, so that a block's points fill the ranges evenly."""
 SOURCE = "source"
 """Name of the reading that says what source agents are trained with."""
 _SLOTS = EnvParams.max_steps_in_episode

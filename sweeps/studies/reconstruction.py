@@ -12,7 +12,7 @@ import numpy as np
 
 from jrcjax.checks import require_integer
 from sweeps.studies.multiverse import SIZE, SMOKE, block_sweep
-from sweeps.studies.readings import PER_BLOCK, values_at
+from sweeps.studies.readings import values_at
 from sweeps.sweep import Size, Study, Sweep
 
 NAME = "reconstruction"
@@ -30,7 +30,7 @@ class Effort:
     confirm: int = 100
     """Fresh seeds of each reading that is confirmed; those of the search count nowhere else."""
     starts: int = STARTS
-    per_generation: int = PER_BLOCK
+    per_generation: int = 16
     """Readings that are tried as one block before the next ones are chosen."""
 
 

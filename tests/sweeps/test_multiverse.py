@@ -32,11 +32,11 @@ def test_a_reading_is_the_same_whatever_the_number_of_readings():
     np.testing.assert_array_equal(unit_of(5, first=20), many[20:25])
     np.testing.assert_array_equal(unit_of(1, first=1), many[1:2])
     assert values_at(many[0]) == {}
-    blocks = sweeps_of(40)
+    blocks = sweeps_of(2 * PER_BLOCK + 8)
     assert [sweep.name for sweep in blocks] == [
-        f"multiverse/{a}" for a in ("000000-000015", "000016-000031", "000032-000039")
+        f"multiverse/{a}" for a in ("000000-000063", "000064-000127", "000128-000135")
     ]
-    assert sweeps_of(16, first=16) == blocks[1:2]
+    assert sweeps_of(PER_BLOCK, first=PER_BLOCK) == blocks[1:2]
 
 
 def test_readings_lie_in_their_ranges_and_each_level_is_tried_equally_often():

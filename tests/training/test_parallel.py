@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import jrcjax
+from jrcjax import numerics
 from jrcjax.learners.hparams import Config, HParams
 from jrcjax.training import parallel
 from jrcjax.training.rollout import init_agent, learner_for, run_episodes
@@ -65,7 +66,7 @@ def test_all_devices_take_an_equal_share(blocks):
     assert shares == dict.fromkeys(jax.devices(), (blocks * parallel.BLOCK,))
 
 
-@pytest.mark.parametrize(("count", "block"), [(1, 1), (3, 2), (64, 32), (100, 64), (5000, 4096), (32768, 4096)])
+@pytest.mark.parametrize(("count", "block"), [(1, 32), (64, 32), (100, 64), (1280, 640), (5000, 2528), (9000, 4096)])
 def test_blocks_of_an_accelerator_hold_its_share(monkeypatch, count, block):
     """Devices of this machine stand for two accelerators: an agent's numbers are those of a CPU's blocks."""
     monkeypatch.setattr(parallel, "devices_for", lambda count, block=None: 2)
@@ -191,6 +192,17 @@ def test_many_cores_do_no_more_than_is_asked():
     assert done.stderr == ""
     rows = [tuple(map(int, line.split())) for line in done.stdout.splitlines()]
     assert rows == [(1, 32, 2), (10, 32, 2), (40, 48, 3), (100, 112, 7), (128, 128, 8), (129, 160, 5), (1000, 1024, 8)]
+
+
+def test_an_accelerator_is_asked_for_whole_numbers(monkeypatch):
+    with jax.default_matmul_precision("tensorfloat32"):
+        numerics.pin_accelerator()
+        assert numerics.in_force()["default_matmul_precision"] == "tensorfloat32"
+    asked = {}
+    monkeypatch.setattr(jax, "default_backend", lambda: "gpu")
+    monkeypatch.setattr(jax.config, "update", asked.__setitem__)
+    numerics.pin_accelerator()
+    assert asked == {"jax_default_matmul_precision": "highest"}
 
 
 _PINNED = """
