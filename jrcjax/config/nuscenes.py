@@ -13,6 +13,7 @@ Tables are read row by row; only what is needed of each sample and each object i
 
 from __future__ import annotations
 
+import codecs
 import math
 import sys
 from collections.abc import Iterator
@@ -38,6 +39,7 @@ CLASSES = {
 }
 """Names of nuScenes' categories by class of objects."""
 SQUARES = ("around", "ahead")
+_MOST_CHARACTERS = 300  # of what a reader of JSON says
 
 
 class Traffic(NamedTuple):
@@ -159,6 +161,8 @@ def _rows(folder: Path, name: str, *columns: str) -> Iterator[tuple[str, dict[st
         found = sorted(str(table.parent) for table in folder.glob("*/sample.json"))
         refuse(str(path), "missing", f"a folder with nuScenes' tables{f', perhaps {found[0]}' if found else ''}")
     with path.open("rb") as file:
+        if file.read(len(codecs.BOM_UTF8)) != codecs.BOM_UTF8:
+            file.seek(0)
         try:
             for number, row in enumerate(ijson.items(file, "item", use_float=True)):
                 where = f"{path}: row {number}"
@@ -167,8 +171,10 @@ def _rows(folder: Path, name: str, *columns: str) -> Iterator[tuple[str, dict[st
                         refuse(where, f"no column {column!r}", f"a row with {', '.join(columns)}")
                 yield where, row
         except ijson.JSONError as error:
-            what = str(error).strip().splitlines()[0]
-            refuse(str(path), f"no JSON after row {number}: {what}", "a JSON array of rows")
+            # The reader of JSON says what it is in the first line, and shows the place in the second.
+            said = [" ".join(line.split()) for line in str(error).strip().splitlines()[:2]]
+            what = f"no JSON after row {number}: {' near '.join(said)}"
+            refuse(str(path), what[:_MOST_CHARACTERS], "a JSON array of rows, whose numbers are finite")
     if number < 0:
         refuse(str(path), "no rows", "a JSON array of rows")
 
@@ -229,7 +235,12 @@ def _pose(where: str, row: dict[str, Any]) -> _Pose:
 def _class_of_instances(folder: Path) -> dict[str, str | None]:
     """The class of every object, None for those of no class."""
     of_name = {name: kind for kind, names in CLASSES.items() for name in names}
-    of_category = {row["token"]: of_name.get(row["name"]) for _, row in _rows(folder, "category", "token", "name")}
+    names = {row["token"]: str(row["name"]) for _, row in _rows(folder, "category", "token", "name")}
+    for kind, known in CLASSES.items():
+        if not set(known) & set(names.values()):
+            found = f"no {kind} among {', '.join(sorted(set(names.values())))}"
+            refuse(f"{folder / 'category.json'}: name", found[:_MOST_CHARACTERS], " or ".join(known))
+    of_category = {token: of_name.get(name) for token, name in names.items()}
     return {
         row["token"]: _linked(where, row, "category_token", of_category, "category")
         for where, row in _rows(folder, "instance", "token", "category_token")

@@ -17,7 +17,7 @@ from jrcjax.checks import refuse
 from jrcjax.containers import POSITIVE, Container, Field, Kind, check_value, schema_of
 from jrcjax.files import write_text
 from jrcjax.model.params import EnvParams, check_params
-from jrcjax.model.presets import ENVIRONMENTS, PRESETS, paper_params
+from jrcjax.model.presets import ENVIRONMENTS, PRESETS, without_bank
 from jrcjax.radar.bank import Radar, make_radar
 from jrcjax.radar.paper import MAX_DENSITY
 
@@ -102,7 +102,7 @@ def params_of(description: Description) -> EnvParams:
     given = dict(description)
     base = {name: given.pop(name) for name in _BASE if name in given}
     if base:
-        given = _merged(_description(paper_params(**base)), given)
+        given = _merged(_description(without_bank(**base)), given)
     for prefix, keys, table in _tables_of(given):
         for name, field in keys.items():
             if field.required and name not in table:

@@ -192,6 +192,11 @@ def emptied(table, rows=()):
         (emptied("sample"), "sample.json: 'no rows'"),
         (emptied("sample", [3]), "sample.json: row 0: \"no column 'token'\""),
         (emptied("sample_annotation", [annotation("s1", "car1", 1000.0, 500.0)]), "'no pedestrians in range'"),
+        (with_value("ego_pose", 0, "translation", [math.nan, 0.0, 0.0]), "ego_pose.json: 'no JSON after row -1: "),
+        (
+            emptied("category", [{"token": f"c-{kind}", "name": kind} for kind in CATEGORIES]),  # Lyft's are like these
+            "category.json: name: 'no cars among adult, car, child, stroller, truck'; allowed: vehicle.car",
+        ),
     ],
 )
 def test_what_is_wrong_with_a_table_is_said(change, message, tmp_path, capsys):
@@ -208,6 +213,13 @@ def test_a_cut_file_is_an_error(tmp_path):
     path.write_text(path.read_text()[:-300])
     with pytest.raises(ValueError, match=r"sample_annotation\.json: 'no JSON after row [4-6]: [^\n]*'; allowed"):
         nuscenes.traffic(tmp_path)
+
+
+def test_a_byte_order_mark_is_skipped(tmp_path):
+    found = nuscenes.traffic(write(tmp_path, tables()))
+    for path in tmp_path.glob("*.json"):
+        path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+    assert nuscenes.traffic(tmp_path) == found
 
 
 def test_the_folder_above_the_tables_is_an_error_that_names_them(tmp_path):

@@ -147,6 +147,11 @@ def test_another_radar_over_a_preset():
         ('environment = "target"\nroad = 3', "road: '3'; allowed: a table [road]"),
         ('environment = "target"\nradar.bandwith = 3', "radar.bandwith: 'an unknown key'; allowed: bandwidth, slope"),
         ("prior = ", "Invalid value"),
+        # The paper's radar, over which these are written, is not built first.
+        ('environment = "target"\nradar.density = 1e6', "radar.density: 1000000.0; allowed: at most 100000 objects"),
+        ('environment = "source"\nradar.bank_size = 1000000', "radar.bank_size: 1000000; allowed: at most "),
+        ('environment = "source"\nradar.bandwidth = [0.5, 0.5]', "radar.bandwidth: [0.5, 0.5]; allowed: numbers"),
+        ("a = " + "[" * 3000, "nested too deeply; allowed: "),
     ],
 )  # fmt: skip
 def test_refusals_name_file_field_value_and_what_is_allowed(text, message, tmp_path):
