@@ -5,6 +5,8 @@ Functions of values take those of one state, [A], or a table over all states, [S
 
 from __future__ import annotations
 
+import functools
+import operator
 from typing import Any
 
 import chex
@@ -15,12 +17,35 @@ from jrcjax.readings import Loss
 from jrcjax.types import Bool, Float, Int
 
 
+@jax.custom_jvp
+def total(values: Float) -> Float:
+    """The sum of a few values [A], written out: XLA hands what it knows as a sum to a library, away from its loops."""
+    return functools.reduce(operator.add, values)
+
+
+total.defjvps(lambda tangent, _, values: tangent.sum())
+
+
+@jax.custom_jvp
+def greatest(values: Float) -> Float:
+    """The largest of a few values [A], written out as `total`; of equals each takes its share of the gradient."""
+    return functools.reduce(jnp.maximum, values)
+
+
+def _greatest_tangent(tangent: Float, answer: Float, values: Float) -> Float:
+    is_greatest = (values == answer).astype(values.dtype)
+    return (tangent * is_greatest).sum() / total(is_greatest)
+
+
+greatest.defjvps(_greatest_tangent)
+
+
 def value_of(q: Float, is_action: Bool) -> Float:
     """Q(s, a) of one action, of values [A] and what is true for that action alone, [A].
 
     The same as q[action]. As a sum it stays part of the loops around it, and columns stay columns under `vmap`.
     """
-    return jnp.where(is_action, q, 0.0).sum()
+    return total(jnp.where(is_action, q, 0.0))
 
 
 def double_q_value(q_online: Float, q_target: Float) -> Float:
@@ -66,7 +91,7 @@ def large_margin_loss(q: Float, is_expert: Bool, margin: Float) -> Float:
       margin: a scalar.
     """
     chex.assert_rank([q, is_expert], 1)
-    return jnp.max(q + jnp.where(is_expert, 0.0, margin)) - value_of(q, is_expert)
+    return greatest(q + jnp.where(is_expert, 0.0, margin)) - value_of(q, is_expert)
 
 
 def l2_loss(weights: Any) -> Float:
