@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable, Mapping
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -22,24 +23,23 @@ def _csv(published: Path, study: str, name: str) -> pd.DataFrame:
     return pd.read_csv(published / study / f"{name}.csv", keep_default_na=True)
 
 
-def _share(row: pd.Series, name: str) -> str:
+def _share(row: Mapping[Hashable, Any], name: str) -> str:
     return f"{percent(row[name])} ({100 * row[f'{name}_low']:.3g} to {100 * row[f'{name}_high']:.3g})"
 
 
 def _deciding(sensitivity: pd.DataFrame, claim: str, most: int = 3) -> str:
     """The questions that decide a statement, with their total-order indices."""
-    of_claim = sensitivity[(sensitivity.claim == claim) & (sensitivity.total_low > _DECIDING)]
-    best = of_claim.sort_values("total", ascending=False).head(most)
-    return ", ".join(f"{row.input} {row.total:.2f}" for row in best.itertuples()) or "no single question"
+    of_claim = sensitivity.query("claim == @claim and total_low > @_DECIDING").nlargest(most, "total")
+    return ", ".join(f"{row['input']} {row['total']:.2f}" for _, row in of_claim.iterrows()) or "no single question"
 
 
 def readings_list(published: Path) -> str:
     """In which share of the readings the statements hold, and what decides."""
     claims, sensitivity = (_csv(published, MULTIVERSE.name, name) for name in ("claims", "sensitivity"))
-    number, by_name = int(claims.readings.max()), claims.set_index("claim")
+    number, by_name = int(claims.readings.max()), {row["claim"]: row for row in claims.to_dict("records")}
     everywhere, nowhere = claims[claims.holds_low > _NEARLY_ALL], claims[claims.holds_high < 1 - _NEARLY_ALL]
     sentences = [
-        f"{name} holds in {_share(by_name.loc[name], 'holds')}; what decides it most (total-order index): "
+        f"{name} holds in {_share(by_name[name], 'holds')}; what decides it most (total-order index): "
         f"{_deciding(sensitivity, name)}."
         for name in NAMED
     ]
@@ -60,12 +60,12 @@ def decided_table(published: Path) -> str:
     error = sensitivity.drop_duplicates("claim").set_index("claim").surrogate_error
     rows = [
         (
-            row.claim,
+            row["claim"],
             _share(row, "holds"),
-            _deciding(sensitivity, row.claim),
-            f"{error[row.claim]:.2f}" if row.claim in error.index else "",
+            _deciding(sensitivity, row["claim"]),
+            f"{error[row['claim']]:.2f}" if row["claim"] in error.index else "",
         )
-        for _, row in claims.iterrows()
+        for row in claims.to_dict("records")
     ]
     return table(("statement", "holds in (95 % interval)", "decided by (total-order index)", "error"), rows)
 
@@ -85,9 +85,11 @@ def questions_table(published: Path) -> str:
     sensitivity, default = _csv(published, MULTIVERSE.name, "sensitivity"), values_at(default_unit())
     rows = []
     for reading in READINGS:
-        of_question = sensitivity[sensitivity.input == reading.label].sort_values("total", ascending=False)
-        most = next(of_question.itertuples(), None)
-        decides = f"{most.claim}: {most.total:.2f} ({most.total_low:.2f} to {most.total_high:.2f})" if most else ""
+        of_question = sensitivity.query("input == @reading.label").nlargest(1, "total")
+        decides = "".join(
+            f"{most['claim']}: {most['total']:.2f} ({most['total_low']:.2f} to {most['total_high']:.2f})"
+            for _, most in of_question.iterrows()
+        )
         value = as_text(reading.path, default[reading.path])
         of_default = value if isinstance(value, str) else f"{value:g}"
         rows.append((f"`{reading.path}`", reading.label, of_default, _searched(reading), decides))
