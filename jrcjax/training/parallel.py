@@ -65,11 +65,16 @@ def use_all_cores() -> None:
     process.
     """
     numerics.pin()
+    set_flags()
+    jax.config.update("jax_num_cpu_devices", max(usable_cores(), 2))
+
+
+def set_flags() -> None:
+    """Adds the flags of _XLA_FLAGS to XLA_FLAGS, for the backend that JAX is yet to start."""
     given = os.environ.get("XLA_FLAGS", "")
     missing = {name: value for name, value in _XLA_FLAGS.items() if name not in given}
     added = [f"{name}={value}" for name, value in missing.items() if _is_known(name, value)]
     os.environ["XLA_FLAGS"] = " ".join([given, *added]).strip()
-    jax.config.update("jax_num_cpu_devices", max(usable_cores(), 2))
 
 
 def _is_known(name: str, value: str) -> bool:
@@ -116,17 +121,26 @@ def block_for(count: int) -> int:
     return min(-(-share // _WARP) * _WARP, ACCELERATOR_BLOCK)
 
 
-def devices_for(count: int, block: int | None = None) -> int:
-    """Devices that work on so many agents: no more than take part in every round of blocks, and two if there are."""
-    blocks, available = -(-count // (block or block_for(count))), jax.device_count()
+def devices_for(count: int, block: int | None = None, available: int | None = None) -> int:
+    """Devices that work on so many agents: no more than take part in every round of blocks, and two if there are.
+
+    Args:
+      count: agents.
+      block: agents that one device advances at once, `block_for` their number if None.
+      available: devices, those of this process if None.
+    """
+    blocks, available = -(-count // (block or block_for(count))), available or jax.device_count()
     rounds = -(-blocks // available)
     return min(max(-(-blocks // rounds), 2), available)
 
 
-def padded(count: int, block: int | None = None) -> int:
-    """The number of agents that `over_agents` works with for `count` of them: a multiple of block times devices."""
+def padded(count: int, block: int | None = None, available: int | None = None) -> int:
+    """The number of agents that `over_agents` works with for `count` of them: a multiple of block times devices.
+
+    The arguments are those of `devices_for`.
+    """
     block = block or block_for(count)
-    unit = block * devices_for(count, block)
+    unit = block * devices_for(count, block, available)
     return -(-count // unit) * unit
 
 

@@ -1,5 +1,6 @@
 """Agents in blocks on all devices give what a plain vmap gives."""
 
+import math
 import os
 import subprocess
 import sys
@@ -36,6 +37,26 @@ def test_padded_is_the_next_multiple(count):
     assert count <= padded < count + UNIT
 
 
+@pytest.mark.parametrize("cores", [2, 3, 16, 64, 192])
+@pytest.mark.parametrize(("points", "most"), [(1, 32), (2, 32), (9, 96)])
+def test_ten_seeds_fill_no_more_blocks_on_many_cores_than_on_two(points, most, cores):
+    asked = 10 * points
+    lanes = parallel.padded(asked, parallel.BLOCK, cores)
+    assert asked <= lanes <= most
+    assert lanes == parallel.padded(lanes, parallel.BLOCK, cores)
+    assert lanes % (parallel.BLOCK * parallel.devices_for(asked, parallel.BLOCK, cores)) == 0
+
+
+@pytest.mark.parametrize("cores", [2, 16, 64])
+@pytest.mark.parametrize("count", [1, 90, 1000, 12_345])
+def test_every_core_has_its_share_of_blocks_and_less_than_a_round_is_padding(count, cores):
+    devices = parallel.devices_for(count, parallel.BLOCK, cores)
+    lanes = parallel.padded(count, parallel.BLOCK, cores)
+    assert 2 <= devices <= cores
+    assert lanes - count < parallel.BLOCK * devices
+    assert lanes // (parallel.BLOCK * devices) == math.ceil(count / (parallel.BLOCK * cores))  # rounds of all cores
+
+
 def test_pad_agents_repeats_the_last():
     tree = {"a": jnp.arange(3), "keys": jax.random.split(jax.random.key(0), 3), "b": jnp.arange(6.0).reshape(3, 2)}
     padded = parallel.pad_agents(tree, 5)
@@ -69,7 +90,7 @@ def test_all_devices_take_an_equal_share(blocks):
 @pytest.mark.parametrize(("count", "block"), [(1, 32), (64, 32), (100, 64), (1280, 640), (5000, 2528), (9000, 4096)])
 def test_blocks_of_an_accelerator_hold_its_share(monkeypatch, count, block):
     """Devices of this machine stand for two accelerators: an agent's numbers are those of a CPU's blocks."""
-    monkeypatch.setattr(parallel, "devices_for", lambda count, block=None: 2)
+    monkeypatch.setattr(parallel, "devices_for", lambda count, block=None, available=None: 2)
     monkeypatch.setattr(jax, "device_count", lambda: 2)
     agents = jnp.arange(float(count))
     wanted = 3.0 * agents + 1.0
