@@ -39,6 +39,9 @@ WORTH = tuple(2.0 ** np.linspace(-4, 4, 33))
 """Factors of rho_1, what a packet earns, over which the optimum of equation (11) is followed."""
 _SETTLED = 0.1  # of the episodes, the last, over which a learner's exact policy is averaged
 
+# Compiled as a whole, once for all environments of a shape, and not operation by operation.
+_front, _long_run = jax.jit(front.front), jax.jit(exact.evaluate_policy)
+
 
 def _exact_row(panel: str, params: EnvParams, name: str, value: float, x, y) -> tuple:
     convention = MissConvention.names()[int(params.miss_convention)]
@@ -47,19 +50,25 @@ def _exact_row(panel: str, params: EnvParams, name: str, value: float, x, y) -> 
 
 def front_rows(panel: str, params: EnvParams, value: float = np.nan) -> list[tuple]:
     """The distinct corners of an environment's front."""
-    corners = np.unique(np.stack(front.front(params), axis=1), axis=0)
+    corners = np.unique(np.stack(_front(params), axis=1), axis=0)
     return [_exact_row(panel, params, "front", value, *corner) for corner in corners]
 
 
-def reward_rows(params: EnvParams) -> list[tuple]:
-    """The optimum of equation (11) for packets that are worth less and more, in that order, and as it is."""
+@jax.jit
+def _optima(params: EnvParams) -> exact.LongRun:
+    """What is optimal for equation (11) where packets are worth WORTH times as much, [33]."""
 
     def optimum(factor: jax.Array) -> exact.LongRun:
         weights = params.reward_weights * jnp.array([factor, 1.0, 1.0, 1.0])
         changed = dataclasses.replace(params, reward_weights=weights)
         return exact.evaluate_policy(changed, exact.optimal_policy(changed))
 
-    runs = jax.jit(jax.vmap(optimum))(jnp.asarray(WORTH, jnp.float32))
+    return jax.vmap(optimum)(jnp.asarray(WORTH, jnp.float32))
+
+
+def reward_rows(params: EnvParams) -> list[tuple]:
+    """The optimum of equation (11) for packets that are worth less and more, in that order, and as it is."""
+    runs = _optima(params)
     numbers = list(zip(WORTH, runs.throughput, runs.miss_detection, strict=True))
     weighted = [_exact_row("a", params, "weighted", *row) for row in numbers]
     return [*weighted, _exact_row("a", params, "optimum", *numbers[WORTH.index(1.0)])]
@@ -68,7 +77,7 @@ def reward_rows(params: EnvParams) -> list[tuple]:
 def random_row(params: EnvParams) -> tuple:
     """The policy that takes each action equally often, as Round Robin does too in the long run."""
     even = jnp.full((params.num_states, params.num_actions), 1.0 / params.num_actions)
-    run = exact.evaluate_policy(params, even)
+    run = _long_run(params, even)
     return _exact_row("a", params, "round_robin", np.nan, run.throughput, run.miss_detection)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import NamedTuple
 
 import jax
@@ -28,24 +29,27 @@ class Reference(NamedTuple):
 
 def reference_of(points: Points, episodes: int) -> Reference:
     """What learners are held against at each point."""
-    slots = points.params.max_steps_in_episode
-
-    def at(point: Points) -> Reference:
-        params, hparams = point
-        best = exact.optimal_policy(params)
-
-        def explored(episode):
-            random = epsilon(episode * slots + jnp.arange(slots), hparams, slots).mean()
-            return exact.evaluate_policy(params, (1 - random) * best + random / params.num_actions)
-
-        optimum, constant = (exact.evaluate_policy(params, p) for p in (best, exact.best_constant_action(params)))
-        return Reference(optimum, constant, jax.vmap(explored)(jnp.arange(episodes)))
-
-    # Some points at a time, in programs of one shape: the policies of many points and episodes would fill the memory.
-    number, of_points = points.hparams.discount.shape[0], jax.jit(jax.vmap(at))
-    size = min(number, _AT_ONCE)
-    parts = []
-    for first in range(0, number, size):
-        rows = np.minimum(np.arange(first, first + size), number - 1)
-        parts.append(jax.tree.map(np.asarray, of_points(jax.tree.map(lambda leaf, rows=rows: leaf[rows], points))))
+    # Some points at a time, in one program for all jobs: the policies of many points would fill the memory.
+    number, parts = points.hparams.discount.shape[0], []
+    for first in range(0, number, _AT_ONCE):
+        rows = np.minimum(np.arange(first, first + _AT_ONCE), number - 1)
+        some = jax.tree.map(lambda leaf, rows=rows: np.asarray(leaf)[rows], points)
+        parts.append(jax.tree.map(np.asarray, _of_points(some, episodes)))
     return jax.tree.map(lambda *leaves: np.concatenate(leaves)[:number], *parts)
+
+
+@functools.partial(jax.jit, static_argnums=1)
+def _of_points(points: Points, episodes: int) -> Reference:
+    return jax.vmap(lambda point: _of_point(point, episodes))(points)
+
+
+def _of_point(point: Points, episodes: int) -> Reference:
+    params, hparams = point
+    best, slots = exact.optimal_policy(params), params.max_steps_in_episode
+
+    def explored(episode):
+        random = epsilon(episode * slots + jnp.arange(slots), hparams, slots).mean()
+        return exact.evaluate_policy(params, (1 - random) * best + random / params.num_actions)
+
+    optimum, constant = (exact.evaluate_policy(params, p) for p in (best, exact.best_constant_action(params)))
+    return Reference(optimum, constant, jax.vmap(explored)(jnp.arange(episodes)))
