@@ -68,12 +68,12 @@ def spread(values: Sequence[float]) -> str:
 
 def header() -> None:
     """Prints the heading of a table of results."""
-    print(f"{'case':16s}{'agents':>7s}{'us/agent-step':>14s}  {'(range)':18s}{'compile s':>9s}{'peak MB':>9s}")
+    print(f"{'case':20s}{'agents':>7s}{'us/agent-step':>14s}  {'(range)':18s}{'compile s':>9s}{'peak MB':>9s}")
 
 
 def row(r: Result) -> None:
     """Prints a result."""
-    print(f"{r.case:16s}{r.agents:7d}{'':6s}{spread(r.us_each)}{r.compile_s:9.1f}{r.peak_rss_mb:9.0f}", flush=True)
+    print(f"{r.case:20s}{r.agents:7d}{'':6s}{spread(r.us_each)}{r.compile_s:9.1f}{r.peak_rss_mb:9.0f}", flush=True)
 
 
 class NotInstalled(Exception):

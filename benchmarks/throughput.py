@@ -4,22 +4,26 @@ algorithm on flashbax's buffer.
 
 All on the paper's source environment, with Table I's sizes, an update in every step, and full memories. Every case runs
 in a process of its own, compiled and warmed up before the first measurement; then one repetition of each in turn. Peers
-run at the best of several numbers of agents. The README has the numbers of a run.
+run at the best of several numbers of agents; those in JAX run with XLA as it is, and again, as NAME_flags, with the
+flags that this package sets (not in a quick run). The README has the numbers of a run.
 """  # noqa: D205
 
 from __future__ import annotations
 
+import functools
 import statistics
+from collections.abc import Callable
 from typing import NamedTuple
 
 from benchmarks import ours
-from benchmarks.measure import Case, NotInstalled, Result, alone, header, in_turns, row, spread
-from benchmarks.peers import flashbax_dqn, rejax_dqn, sb3_dqn
+from benchmarks.measure import Case, NotInstalled, Ready, Result, alone, header, in_turns, row, spread
+from benchmarks.peers import flashbax_dqn, purejaxrl_dqn, rejax_dqn, sb3_dqn
 
 RATIOS = (
     ("ddqn", "rejax_dqn"),
     ("ddqn", "sb3_dqn"),
     ("ddqn", "flashbax_dqn"),
+    ("ddqn", "purejaxrl_dqn"),
     ("tlwd", "flashbax_tlwd"),
     ("ddqn", "tlwd"),
 )
@@ -30,6 +34,15 @@ class Peer(NamedTuple):
 
     candidates: tuple[Case, ...]
     """The first is taken in a quick run."""
+    in_jax: bool = True
+
+
+def with_flags(setup: Callable[[int, int], Ready], agents: int, steps: int) -> Ready:
+    """A peer with the XLA flags that this package sets, on one device as without them."""
+    from jrcjax.training import parallel
+
+    parallel.set_flags()
+    return setup(agents, steps)
 
 
 def cases(quick: bool) -> list[Case | Peer]:
@@ -37,8 +50,8 @@ def cases(quick: bool) -> list[Case | Peer]:
     long = 10 if quick else 100
     short = 1 if quick else 4
 
-    def peer(name, setup, sizes, processes=1):
-        return Peer(tuple(Case(name, setup, agents, steps * short, processes) for agents, steps in sizes))
+    def peer(name, setup, sizes):
+        return Peer(tuple(Case(name, setup, agents, steps * short) for agents, steps in sizes))
 
     return [
         Case("env", ours.environment, 1024, 100 * long),
@@ -46,8 +59,9 @@ def cases(quick: bool) -> list[Case | Peer]:
         Case("ddqn", ours.ddqn, 64, 300 * long),
         Case("tlwd", ours.tlwd, 64, 300 * long // 2),
         peer("rejax_dqn", rejax_dqn.setup, ((8, 300), (4, 600), (16, 150), (64, 50))),
-        peer("sb3_dqn", sb3_dqn.setup, ((1, 500),), processes=2),
+        Peer((Case("sb3_dqn", sb3_dqn.setup, 1, 500 * short, processes=2),), in_jax=False),
         peer("flashbax_dqn", flashbax_dqn.double_dqn, ((64, 200), (16, 800), (128, 100), (256, 50))),
+        peer("purejaxrl_dqn", purejaxrl_dqn.setup, ((16, 400), (4, 800), (64, 100))),
         peer("flashbax_tlwd", flashbax_dqn.tlwd, ((16, 200), (8, 400), (64, 50))),
     ]
 
@@ -65,22 +79,31 @@ def fastest(peer: Peer, quick: bool) -> Case:
     return min(zip(results, peer.candidates, strict=True), key=lambda pair: pair[0].us_per_agent_step)[1]
 
 
+def _as_run(case: Case | Peer, quick: bool) -> list[Case]:
+    """The case itself, or a peer's best one, without and with our flags."""
+    if isinstance(case, Case):
+        return [case]
+    best = fastest(case, quick)
+    flagged = best._replace(name=best.name + "_flags", setup=functools.partial(with_flags, best.setup))
+    return [best, flagged] if case.in_jax and not quick else [best]
+
+
 def run(quick: bool) -> list[Result]:
     """Measures all cases and prints a table and ratios."""
-    chosen = [fastest(case, quick) if isinstance(case, Peer) else case for case in cases(quick)]
+    chosen = [one for case in cases(quick) for one in _as_run(case, quick)]
     results, lacking = in_turns(chosen, 3 if quick else 9)
     header()
     for result in results:
         row(result)
     for name, package in lacking.items():
-        print(f"{name:16s}not measured: the package {package} is missing; `make bench` installs it")
+        print(f"{name:20s}not measured: the package {package} is missing; `make bench` installs it")
     by_name = {result.case: result for result in results}
     print("\nus per agent-step of the second, divided by the first's")
-    for first, second in RATIOS:
+    for first, second in [(a, name) for a, b in RATIOS for name in (b, b + "_flags")]:
         if first in by_name and second in by_name:
             a, b = by_name[first].us_each, by_name[second].us_each
             ratios = [y / x for x, y in zip(a, b, strict=True)]
-            print(f"{first + ' : ' + second:24s}{spread(ratios)}")
+            print(f"{first + ' : ' + second:28s}{spread(ratios)}")
     if "ddqn" in by_name:
         seconds = 300_000 * statistics.median(by_name["ddqn"].us_each) * 1e-6
         print(f"\na DDQN agent of the paper (1000 episodes of 300 slots) costs {seconds:.2f} s of this machine")
