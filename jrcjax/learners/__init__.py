@@ -20,10 +20,12 @@ LEARNERS: dict[str, LearnerFactory] = {
     "dpr": dpr,
     "tlwd": tlwd,
 }
+GOES_ON_AS = {"dpr": "ddqn"}
+"""Learners that differ from another one in their start alone."""
 
 __all__ = [
-    "LEARNERS", "Learner", "LearnerFactory", "Source", "Spec", "ddqn", "dpr", "make_learner", "q_learning",
-    "round_robin", "tlwd",
+    "GOES_ON_AS", "LEARNERS", "Learner", "LearnerFactory", "Source", "Spec", "ddqn", "dpr", "make_learner",
+    "q_learning", "round_robin", "tlwd",
 ]  # fmt: skip
 
 
