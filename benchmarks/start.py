@@ -1,32 +1,48 @@
-"""Claim: no sweep takes more than 30 s to compile, and a second run needs a few seconds.
+"""Claim: set-up takes less than 60 s with pip alone, and so does the tiny version of all figures with nothing compiled.
 
-Each measurement is a process of its own: from the start of Python to the first compiled environment step, and for each
-sweep the compiling of its program, first with an empty folder of compiled programs, then with what is there after it.
+From import to the first trained episode it takes less than 5 s, and less than 2 s from then on. All but set-up is
+measured in processes of their own, first with an empty folder of compiled programs, then with what is there after it.
+Of each sweep only the compiling of its learners' programs is timed.
 """
 
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
 import time
+from pathlib import Path
 
 from benchmarks.measure import Result
 
-_FIRST_STEP = """
+_ROOT = Path(__file__).parents[1]
+_ENVIRONMENT = """
 from jrcjax.training import parallel
-parallel.use_all_cores(); parallel.keep_compiled()
-import jax, jrcjax
-env = jrcjax.JRCEnv()
-key = jax.random.key(0)
+parallel.start()
+import functools, jax, jrcjax
+env, key, params = jrcjax.JRCEnv(), jax.random.key(0), jrcjax.paper_params("target")
+"""
+_PARTS = {
+    "import": "import jrcjax",
+    "import to placements": _ENVIRONMENT,
+    "import to first step": _ENVIRONMENT
+    + """
 obs, state = jax.jit(env.reset)(key)
 jax.block_until_ready(jax.jit(env.step)(key, state, 0))
-"""
+""",
+    "import to first episode": _ENVIRONMENT
+    + """
+train = functools.partial(jrcjax.train, learner="ddqn", config=jrcjax.Config(episodes=1))
+jax.block_until_ready(jax.jit(train)(key, params))
+""",
+}
+"""What a process runs, all of which counts."""
 _SWEEP = """
 import sys, time
 from jrcjax.training import parallel
-parallel.use_all_cores(); parallel.keep_compiled()
+parallel.start()
 import jax, jrcjax, numpy as np
 from sweeps.engine import program
 from sweeps.engine.job import Job
@@ -34,8 +50,7 @@ from sweeps.studies import registry
 from sweeps.sweep import Size
 sweep = registry.SWEEPS[sys.argv[1]]
 job = Job(sweep, Size())
-points, config = job.points, job.groups[0].config
-compiled = program.program_of(sweep.learners, job.spec, config, program.chunk_of(config.episodes))
+points, config = program.filled_up(job.points), job.groups[0].config
 lanes = parallel.padded(1)  # of every group
 source = None
 if sweep.source:
@@ -46,28 +61,62 @@ if sweep.source:
 keys = program.keys_of(np.arange(lanes))
 where = jax.ShapeDtypeStruct((lanes,), "int32")
 begin = time.perf_counter()
-start = compiled.start.lower(points, (keys, source, where))
-agents = jax.eval_shape(compiled.start, points, (keys, source, where))
-start.compile()
-compiled.advance.lower((points, jax.ShapeDtypeStruct((), "int32")), (agents, where)).compile()
+for name in sweep.learners:
+    compiled = program.program_of(name, job.spec, config, program.chunk_of(config.episodes))
+    lane = keys, source if compiled.needs_source else None, where
+    start = compiled.start.lower(points, lane)
+    agents = jax.eval_shape(compiled.start, points, lane)
+    start.compile()
+    compiled.advance.lower((points, jax.ShapeDtypeStruct((), "int32")), (agents, where)).compile()
 print(time.perf_counter() - begin)
 """
 
 
 def run(quick: bool) -> list[Result]:
-    """Measures the first step and all sweeps, cold and warm, and prints a table."""
+    """Measures all parts, cold and warm, and prints a table; a quick run leaves set-up and most sweeps out."""
     from sweeps.studies.registry import SWEEPS
 
-    print(f"{'s':>24s}{'cold':>8s}{'again':>8s}")
-    with tempfile.TemporaryDirectory() as cache:
-        env = os.environ | {"XDG_CACHE_HOME": cache}
-
-        def seconds(*args: str) -> float:
-            begin = time.perf_counter()
-            done = subprocess.run([sys.executable, "-c", *args], check=True, capture_output=True, text=True, env=env)
-            return float(done.stdout) if done.stdout else time.perf_counter() - begin
-
-        print(f"{'import to first step':24s}{seconds(_FIRST_STEP):8.1f}{seconds(_FIRST_STEP):8.1f}", flush=True)
+    if not quick:
+        print(f"{'set-up with pip':28s}{_set_up():8.1f} s", flush=True)
+    print(f"{'s':>28s}{'cold':>8s}{'again':>8s}")
+    with tempfile.TemporaryDirectory() as folder:
+        for number, (name, code) in enumerate(_PARTS.items()):
+            _row(name, Path(folder, str(number)), "-c", code)
+        _row("all figures, tiny version", Path(folder, "figures"), "-m", "paper_figs", "--smoke", "--out")
         for name in ("fig5b",) if quick else SWEEPS:
-            print(f"{'compiling ' + name:24s}{seconds(_SWEEP, name):8.1f}{seconds(_SWEEP, name):8.1f}", flush=True)
+            _row(f"compiling {name}", Path(folder, "sweeps"), "-c", _SWEEP, name)
     return []
+
+
+def _row(name: str, cache: Path, *args: str) -> None:
+    """Prints how long Python takes with a folder of compiled programs as it is, and again.
+
+    If the process prints a number of seconds, that counts; after `--out` it is given a new folder each time.
+    """
+    print(f"{name:28s}", end="", flush=True)
+    for repetition in ("cold", "again"):
+        out = [str(cache / repetition)] if args[-1] == "--out" else []
+        env = os.environ | {"XDG_CACHE_HOME": str(cache)}
+        begin = time.perf_counter()
+        command = [sys.executable, *args, *out]
+        done = subprocess.run(command, check=True, capture_output=True, text=True, cwd=_ROOT, env=env)
+        seconds = time.perf_counter() - begin if out or not done.stdout else float(done.stdout)
+        print(f"{seconds:8.1f}", end="" if repetition == "cold" else "\n", flush=True)
+
+
+def _set_up() -> float:
+    """Seconds of `make setup` in a copy of this checkout, where no uv is found."""
+    with tempfile.TemporaryDirectory() as folder:
+        copy, tools = Path(folder, "copy"), Path(folder, "tools")
+        shutil.copytree(_ROOT, copy, ignore=shutil.ignore_patterns(".*", "published", "out", "site"), symlinks=True)
+        path = os.environ.get("PATH", os.defpath).split(os.pathsep)
+        clean = [entry for entry in path if not Path(entry, "uv").exists()] + [str(tools)]
+        tools.mkdir()
+        for tool in ("make", "sh", "rm", "touch", "git"):  # which may lie beside uv
+            if found := shutil.which(tool):
+                (tools / tool).symlink_to(found)
+        begin = time.perf_counter()
+        interpreter = f"PYTHON={Path(sys.base_prefix, 'bin', 'python3')}"
+        env = os.environ | {"PATH": os.pathsep.join(clean)}
+        subprocess.run(["make", "--silent", "setup", interpreter], check=True, cwd=copy, env=env)
+        return time.perf_counter() - begin
