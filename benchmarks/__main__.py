@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import importlib
 import json
 import os
@@ -18,15 +19,24 @@ from sweeps.options import FLAGS, File
 NAMES = ("throughput", "scaling", "limit", "canary", "start", "sum_tree", "paper", "vector", "accelerator")
 
 
+def _claim_of(name: str) -> str:
+    """The first sentence of a benchmark's file, without running it."""
+    text = (Path(__file__).parent / f"{name}.py").read_text(encoding="utf-8")
+    return " ".join(str(ast.get_docstring(ast.parse(text))).split()).split(". ")[0].rstrip(".")
+
+
+def _names_in_words() -> str:
+    return "\n".join(["Benchmarks to run. Default: throughput.", *(f"{name}: {_claim_of(name)}." for name in NAMES)])
+
+
 @dataclass(frozen=True)
 class Options:
     """Measures speed and memory on this machine, each benchmark against the claim at the top of its file."""
 
     names: Annotated[
-        tyro.conf.Positional[tuple[str, ...]], tyro.conf.arg(metavar="[NAME ...]", help_behavior_hint="")
+        tyro.conf.Positional[tuple[str, ...]],
+        tyro.conf.arg(metavar="[NAME ...]", help_behavior_hint="", help=_names_in_words()),
     ] = ()
-    """Benchmarks to run: throughput, scaling, limit, canary, start, sum_tree, paper, vector, accelerator.
-    Default: throughput."""
     json: File = None
     """File for machine and results."""
     quick: bool = False
@@ -48,7 +58,7 @@ def main(args: list[str] | None = None) -> int:
     results = []
     for name in options.names or ("throughput",):
         module = importlib.import_module(f"benchmarks.{name}")
-        print(f"\n== {name}: {' '.join(str(module.__doc__).split('.')[0].split())}.", flush=True)
+        print(f"\n== {name}: {_claim_of(name)}.", flush=True)
         results += module.run(options.quick)
     if options.json is not None:
         content = {"machine": machine() | {"versions": versions()}, "results": [asdict(result) for result in results]}

@@ -58,7 +58,7 @@ class LongRun(NamedTuple):
 
 def level_transition(prior: Float[Array, " J"], persistence: Float[Array, ""]) -> Float[Array, "J J"]:
     """Transition matrix of one factor, [J, J]: kappa I + (1 - kappa) 1 tau^T."""
-    return persistence * jnp.eye(prior.shape[0]) + (1.0 - persistence) * prior[None, :]
+    return persistence * jnp.eye(prior.shape[0], dtype=prior.dtype) + (1.0 - persistence) * prior[None, :]
 
 
 def _of_all(matrices: Sequence[Array]) -> Float[Array, "S S"]:
@@ -82,7 +82,7 @@ def transition_tensor(params: EnvParams) -> Float[Array, "S A S"]:
 @of_params
 def stationary_distribution(params: EnvParams) -> Float[Array, " S"]:
     """Long-run probability of each state under every policy, [S]: the product of the priors."""
-    law = jnp.ones(1)
+    law = jnp.ones(1, jnp.float32)
     for factor in params.factors:
         law = jnp.kron(law, factor.prior)
     return law
@@ -100,7 +100,7 @@ def packet_table(params: EnvParams) -> Float[Array, "S A"]:
 @of_params
 def miss_table(params: EnvParams) -> Float[Array, " A"]:
     """E[p_k] of each action, [A]; 1 for data."""
-    return jnp.concatenate([jnp.ones(params.num_rates), mean_miss_ratio(params.radar)])
+    return jnp.concatenate([jnp.ones(params.num_rates, jnp.float32), mean_miss_ratio(params.radar)])
 
 
 def _is_data(params: EnvParams) -> Bool[Array, " A"]:
@@ -207,7 +207,11 @@ def value_iteration(
         # Only differences matter until the end; small numbers round less.
         return new - new.min(), change, sweeps + 1
 
-    start = (jnp.zeros(params.num_states), jnp.full(params.num_states, jnp.inf).at[0].set(-jnp.inf), 0)
+    start = (
+        jnp.zeros(params.num_states, jnp.float32),
+        jnp.full(params.num_states, jnp.inf, jnp.float32).at[0].set(-jnp.inf),
+        jnp.int32(0),
+    )
     relative, _, _ = jax.lax.while_loop(unsettled, sweep, start)
     # One more sweep from the relative values gives bounds that refer to exactly these values.
     new = backup(relative).max(axis=1)
@@ -223,7 +227,7 @@ def optimal_policy(params: EnvParams, gamma: Float[Array, ""] | float = 0.99) ->
 
 def policy_of_actions(actions: Int[Array, "*batch S"], num_actions: int) -> Float[Array, "*batch S A"]:
     """Probabilities [..., S, A] of a deterministic policy given as actions [..., S]."""
-    return jax.nn.one_hot(actions, num_actions)
+    return jax.nn.one_hot(actions, num_actions, dtype=jnp.float32)
 
 
 @of_params

@@ -84,7 +84,7 @@ def _lower_boundary(gain: Float, cost: Float) -> Boundary:
     order = jnp.argsort(jnp.where(gains > 0, costs / jnp.where(gains > 0, gains, 1.0), jnp.inf))
 
     def walk(start, steps):
-        return start.sum() + jnp.concatenate([jnp.zeros(1), jnp.cumsum(steps[order])])
+        return start.sum() + jnp.concatenate([jnp.zeros(1, steps.dtype), jnp.cumsum(steps[order])])
 
     return Boundary(walk(start_gain, gains), walk(start_cost, costs))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import re
 import shlex
 import struct
 from pathlib import Path
@@ -19,7 +20,7 @@ from jrcjax.named import field_at, named_inputs
 from paper_figs.claims import words
 from paper_figs.claims.judge import Judgement
 from paper_figs.claims.results import Rules
-from sweeps.preset import environment_of, label_of
+from sweeps.preset import environment_of, label_of, slots_of
 from sweeps.sweep import Size
 
 _TEMPLATE = Path(__file__).with_name("report.html.jinja")
@@ -71,6 +72,7 @@ def render(
         "short": words.number,
         "criterion": words.criterion,
         "interval": words.interval,
+        "anchor": _anchor,
     }
     return environment.from_string(_TEMPLATE.read_text(encoding="utf-8")).render(
         size=size,
@@ -83,6 +85,7 @@ def render(
         least_seeds=Rules().least_seeds,
         environments=_environments(size.preset),
         optima=optima,
+        slots=slots_of(size.preset),
         diverged=diverged,
         command=_command(size),
         settings=_settings(parsed),
@@ -102,6 +105,11 @@ def _picture(title: str, path: Path) -> dict[str, Any]:
 def _number(value: float) -> str:
     """A number for a table, with four digits; a dash where there is none."""
     return "–" if value != value else f"{value:#.4g}".rstrip(".").replace("-", "−")
+
+
+def _anchor(claim: Judgement) -> str:
+    """The id of a claim's row: "c1-reached" for "C1 (reached)"."""
+    return re.sub(r"[^a-z0-9]+", "-", claim.claim.lower()).strip("-")
 
 
 def _figure_of(claim: Judgement, figures: list[dict[str, Any]]) -> str | None:

@@ -49,8 +49,8 @@ def _dense_backward(relu: bool, saved: tuple[Float, Float, Float], gradient: Flo
     barrier = jax.lax.optimization_barrier
     if x.shape[0] <= _SHORT:  # the bias is the weight of an input that is always 1; eight columns are faster than six
         size = x.shape[0]
-        padding = jnp.zeros((-(size + 1) % 8, x.shape[1]))
-        inputs = jnp.concatenate([x, jnp.ones((1, x.shape[1])), padding])
+        padding = jnp.zeros((-(size + 1) % 8, x.shape[1]), x.dtype)
+        inputs = jnp.concatenate([x, jnp.ones((1, x.shape[1]), x.dtype), padding])
         of_all = gradient @ barrier(inputs.T)
         of_kernel, of_bias = of_all[:, :size], of_all[:, size]
     else:
@@ -91,7 +91,7 @@ class ColumnDense(nn.Module):
     def __call__(self, x: Float) -> Float:
         """[in, S] to [features, S]."""
         kernel = self.param("kernel", self.kernel_init, (self.features, x.shape[0]))
-        bias = self.param("bias", nn.initializers.zeros, (self.features,))
+        bias = self.param("bias", nn.initializers.zeros, (self.features,), jnp.float32)
         return dense(kernel, bias, x, self.relu)
 
 

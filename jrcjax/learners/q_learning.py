@@ -32,7 +32,7 @@ def q_learning(spec: Spec, config: Config) -> Learner:
     shape = (num_states(spec.shape), spec.num_actions)
 
     def init(key, hparams: HParams, source=None) -> QState:
-        return QState(jnp.zeros(shape), jnp.zeros(shape, jnp.int32))
+        return QState(jnp.zeros(shape, jnp.float32), jnp.zeros(shape, jnp.int32))
 
     def act(state: QState, state_id, step, words, hparams: HParams):
         return exploration.epsilon_greedy(words, state.q[state_id], epsilon(step, hparams, spec.episode_slots))

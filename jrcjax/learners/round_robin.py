@@ -12,7 +12,7 @@ from jrcjax.model.states import num_states
 def round_robin(spec: Spec, config: Config) -> Learner:
     """Action t mod A in step t, whatever the state; in the long run the uniform policy."""
     del config
-    uniform = jnp.full((num_states(spec.shape), spec.num_actions), 1.0 / spec.num_actions)
+    uniform = jnp.full((num_states(spec.shape), spec.num_actions), 1.0 / spec.num_actions, jnp.float32)
     return Learner(
         num_words=0,
         init=lambda key, hparams, source=None: (),

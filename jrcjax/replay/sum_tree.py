@@ -145,8 +145,8 @@ def sample(tree: Float, words: Words, layout: Layout) -> tuple[Int, Float]:
 
 def _node_at(rows: Float, share: Float) -> Int:
     """Which of the values [N, children] lies at these shares [B] of their running sum, among the positive ones, [B]."""
-    within = rows @ jnp.triu(jnp.ones((rows.shape[1],) * 2))  # sums up to each value
-    before = jnp.tril(jnp.ones((rows.shape[0],) * 2), -1) @ within[:, -1]
+    within = rows @ jnp.triu(jnp.ones((rows.shape[1],) * 2, rows.dtype))  # sums up to each value
+    before = jnp.tril(jnp.ones((rows.shape[0],) * 2, rows.dtype), -1) @ within[:, -1]
     running = before[:, None] + within
     at = share * running[-1, -1]
     # Row by row, which leaves a short sum, and vectors of a row's length.

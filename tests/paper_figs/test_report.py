@@ -4,6 +4,7 @@ import dataclasses
 import functools
 import html.parser
 import json
+import math
 import re
 import shutil
 import subprocess
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 import worlds
 import xarray as xr
+from browser import CHROMIUM, Browser
 
 from paper_figs import pipeline, report
 from paper_figs.figures import FIGURES
@@ -85,12 +87,17 @@ def parsed(page):
 def test_elements_are_closed_and_links_lead_somewhere(parsed):
     assert parsed.open == []
     assert len(set(parsed.ids)) == len(parsed.ids)
-    assert {link.removeprefix("#") for link in parsed.links} <= set(parsed.ids)
+    assert {link.removeprefix("#") for link in parsed.links if link.startswith("#")} <= set(parsed.ids)
+    beside = {f"{figure.name}{suffix}" for figure in FIGURES for suffix in (".png", ".pdf", ".csv")}
+    beside |= {"claims.json"}
+    others = {link for link in parsed.links if not link.startswith("#")} - {"seeds_needed.csv"}  # if some are undecided
+    assert others == beside | {"https://arxiv.org/abs/2105.13670"}
+    assert all((REFERENCE / name).is_file() for name in beside)
 
 
 def test_nothing_is_loaded_from_elsewhere(page, parsed):
     assert all(address.startswith("data:image/png;base64,") for address in parsed.loaded)
-    assert not re.search(r"url\(|@import|<script|<link|https?:", page)
+    assert not re.search(r"url\(|@import|<script [^>]*src|<link|fetch\(|https?:(?!//arxiv.org/abs/)", page)
 
 
 def test_every_figure_is_there_with_a_text_in_its_place(parsed):
@@ -106,9 +113,12 @@ def test_every_claim_is_there_with_its_verdict_in_words_and_a_link_to_its_figure
         row = next(row for row in parsed.rows if row.startswith(f"{claim.claim}|"))
         assert f"{report.SIGNS[claim.verdict]} {claim.verdict}" in row
         assert claim.statement in row
+        anchor = report._anchor(claim)
+        assert parsed.ids.count(anchor) == 1
+        assert parsed.links.count(f"#{anchor}") == 1  # from its figure
     links = [link for link in parsed.links if link in {f"#{figure.name}" for figure in FIGURES}]
-    assert len(links) == len(judgements())
-    assert links[0] == "#fig5a"
+    assert len(links) == len(FIGURES) + len(judgements())  # back from the large figures, and from each claim
+    assert links[len(FIGURES)] == "#fig5a"
     assert links[-1] == "#fig9"
     assert len(set(report.SIGNS.values())) == 3
 
@@ -152,6 +162,31 @@ def test_settings_and_origin_are_there(page, parsed):
 )
 def test_the_command_makes_the_page_anew(size, command):
     assert report._command(size) == command
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(CHROMIUM is None, reason="needs a Chromium")
+def test_claims_are_sorted_and_figures_enlarged(page, tmp_path):
+    (tmp_path / "report.html").write_text(page)
+    browser = Browser(tmp_path / "profile")
+    try:
+        browser.call("Page.navigate", url=(tmp_path / "report.html").as_uri())
+        browser.wait("document.querySelector('th button') !== null")
+        heads = "[...document.querySelectorAll('.sortable th button')].find(b => b.textContent === 'measured')"
+        cells = "[...document.querySelectorAll('.sortable tbody tr')].map(row => +row.cells[5].dataset.value)"
+        for sign in (1, -1):
+            browser.run(f"{heads}.click()")
+            values = [sign * value for value in browser.run(cells) if value is not None and math.isfinite(value)]
+            assert values == sorted(values)
+            assert len(values) > 30
+        browser.run("document.querySelector('#fig6-large > a:not(.close)').click()")
+        shown = "getComputedStyle(document.getElementById('fig6-large')).position"
+        assert browser.run(shown) == "fixed"
+        browser.run("document.querySelector('#fig6-large .close').click()")
+        assert browser.run(shown) == "static"
+        assert browser.run("document.querySelector('#fig6 a.png').href").startswith("data:image/png")
+    finally:
+        browser.close()
 
 
 @pytest.mark.parametrize("width", [390, 1280])

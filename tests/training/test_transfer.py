@@ -101,6 +101,16 @@ def test_same_arguments_same_numbers_and_others_with_another_key(compiled, study
     assert all((study.logs[name].reward != other.logs[name].reward).any() for name in TARGET_LEARNERS)
 
 
+def test_types_are_the_same_where_64_bits_are_allowed(params):
+    """JAX_ENABLE_X64 makes float64 of whatever has no type of its own."""
+    with jax.enable_x64(True):
+        study = jax.eval_shape(lambda key: run(key, *params), KEYS[0])
+        solved = jax.eval_shape(lambda p: jrcjax.exact.evaluate_policy(p, jrcjax.exact.optimal_policy(p)), params[1])
+        corners = jax.eval_shape(jrcjax.front.reachable, params[1])
+    numbers = [leaf for leaf in jax.tree.leaves((study, solved, corners)) if jnp.issubdtype(leaf.dtype, jnp.number)]
+    assert {leaf.dtype.itemsize for leaf in numbers} == {4}
+
+
 # --- vmap -------------------------------------------------------------------------------------------------------------
 
 
