@@ -15,7 +15,7 @@ import jrcjax
 from benchmarks.__main__ import main as benchmarks_main
 from jrcjax import exact, radar
 from jrcjax.learners.hparams import check_config, check_hparams
-from jrcjax.training import footprint
+from jrcjax.training import footprint, rollout
 from paper_figs.__main__ import main as figures_main
 from sweeps.__main__ import main as sweeps_main
 from sweeps.engine.run import run_sweep
@@ -54,8 +54,8 @@ class Malformed:
         self.fields = sorted(leaves_of(target))
         self.env = jrcjax.JRCEnv(target)
         for name in ("ddqn", "tlwd"):  # estimates use small constants, such as the features of states
-            learner = jrcjax.training.rollout.learner_for(name, target, jrcjax.Config())
-            footprint.agent_bytes(learner, jrcjax.training.rollout.spec_of(target), jrcjax.Config())
+            learner = rollout.learner_for(name, target, jrcjax.Config())
+            footprint.agent_bytes(learner, rollout.spec_of(target), jrcjax.Config())
         self.file = tmp_path / "file"
         self.file.write_text("")
 
@@ -280,8 +280,8 @@ def test_there_are_a_thousand_of_them():
 
 def test_what_fits_into_memory_is_not_refused(target, monkeypatch):
     """The estimate decides, and not the bound that saves the tracing."""
-    spec, config = jrcjax.training.rollout.spec_of(target), jrcjax.Config()
-    learner = jrcjax.training.rollout.learner_for("ddqn", target, config)
+    spec, config = rollout.spec_of(target), jrcjax.Config()
+    learner = rollout.learner_for("ddqn", target, config)
     one = footprint.agent_bytes(learner, spec, config)
     assert 8 * config.replay_capacity <= one <= 16 * config.replay_capacity
     monkeypatch.setattr(footprint, "physical_memory", lambda: 20 * one)

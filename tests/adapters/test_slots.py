@@ -132,7 +132,9 @@ def test_fresh_placements_come_from_the_model():
     got = slots.run(words, state, action, state)
     wanted = run_slots(words, state, action, state, fresh)
     assert_equal(got, wanted)
-    assert set(got.miss_ratio) - set(slots_of(params).tables.miss_ratio)  # Poisson counts, so none of the bank's
+    tables = slots_of(params)
+    assert isinstance(tables, TableSlots)
+    assert set(got.miss_ratio) - set(tables.tables.miss_ratio)  # Poisson counts, so none of the bank's
     one = slots.run_one(words[:, 3].tolist(), int(state[3]), int(action[3]), int(state[3]))
     assert one == tuple(column[3].item() for column in got)
     assert slots.first_state(words[:, 3].tolist()) == slots.first_states(words)[3]

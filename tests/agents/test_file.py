@@ -16,7 +16,10 @@ import jrcjax
 from jrcjax import exact
 from jrcjax.agents import layout
 from jrcjax.config.toml import to_toml
+from jrcjax.model import states
 from jrcjax.model.params import Factor
+from jrcjax.training import rollout
+from jrcjax.training.source import source_of
 from sweeps.design import along
 from sweeps.engine.job import Job
 from sweeps.engine.run import run_sweep
@@ -98,7 +101,7 @@ def test_an_agent_comes_back_bit_by_bit_with_all_that_made_it(name, saved, train
 
 @pytest.mark.parametrize("name", LEARNERS)
 def test_its_policy_is_that_of_the_live_agent(name, saved, trained, params):
-    rule = jrcjax.training.rollout.learner_for(name, params, CONFIG)
+    rule = rollout.learner_for(name, params, CONFIG)
     np.testing.assert_array_equal(saved[name].policy(), rule.policy(trained[name][0].learner))
 
 
@@ -114,7 +117,7 @@ def test_it_acts_on_numpy_observations(saved, params):
     agent = saved["ddqn"]
     actions = np.asarray(agent.policy()).argmax(axis=1)
     ids = np.arange(params.num_states)
-    observations = np.array(jrcjax.model.states.features_of(jnp.asarray(ids), params.shape))
+    observations = np.array(states.features_of(jnp.asarray(ids), params.shape))
     np.testing.assert_array_equal(agent.act(observations), actions)
     assert [int(agent.act(row)) for row in observations] == actions.tolist()
     assert agent.act([0, 1, 1, 0, 1]) == actions[0b01101]
@@ -200,7 +203,7 @@ def test_what_it_hands_on_is_what_the_source_agent_in_memory_hands_on(saved, par
 def test_a_transfer_from_it_is_the_transfer_from_memory(saved, trained, params, other, tmp_path):
     agent = trained["ddqn"][0]
     policy = saved["ddqn"].policy()
-    hand_on = jax.jit(jrcjax.training.source.source_of, static_argnames="config")
+    hand_on = jax.jit(source_of, static_argnames="config")
     in_memory = hand_on(agent.key, policy, agent.learner.weights, params, HPARAMS, config=CONFIG)
     (from_disk, log), (from_memory, other_log) = (
         trainer("tlwd")(other, source) for source in (saved["ddqn"].source(), in_memory)

@@ -51,7 +51,7 @@ def test_table_holds_bin_means_over_seeds_and_the_exact_optimum():
     ddqn = table[table.algorithm == "ddqn"]
     reward = data["reward"].sel(algorithm="ddqn").isel(point=0).values
     np.testing.assert_array_equal(ddqn.x, np.arange(8, 801, 8))
-    np.testing.assert_allclose(ddqn["mean"].iloc[3], reward[:, 24:32].mean())
+    np.testing.assert_allclose(np.asarray(ddqn["mean"])[3], reward[:, 24:32].mean())
     assert (ddqn.ci_low < ddqn["mean"]).all()
     assert set(ddqn.n_seeds) == {6}
     optimum = table[table.algorithm == "optimum"]
@@ -240,4 +240,4 @@ def test_one_column_is_as_wide_as_a_papers_and_no_text_is_smaller_than_six_point
         (points.draw(points.table(speed_world(), "6", "high_speed_event_probability", SLOTS), "title", "x"), 7.16),
     ):
         assert figure.get_figwidth() == width
-        assert min(text.get_fontsize() for text in figure.findobj(Text)) >= 6
+        assert min(float(text.get_fontsize()) for text in figure.findobj(Text)) >= 6

@@ -9,7 +9,7 @@ import numpy_model
 import pytest
 from compiling import nothing_compiles
 from scipy import stats
-from significance import ALPHA, means_differ, same_law, z
+from significance import ALPHA, means_differ, p_of, same_law, z
 
 from jrcjax import radar
 from jrcjax.model import slot
@@ -218,7 +218,7 @@ def test_paper_banks_hold_thousands(target, source):
 def test_short_range_misses_less(target, source):
     for params in (target, source):
         long, short = params.radar.miss_bank
-        assert stats.ttest_ind(long, short, equal_var=False, alternative="greater").pvalue < ALPHA
+        assert p_of(stats.ttest_ind(long, short, equal_var=False, alternative="greater")) < ALPHA
 
 
 _miss_ratios = jax.jit(

@@ -194,7 +194,7 @@ def filled(priorities: np.ndarray, alpha: float, capacity: int, demonstrations: 
 
 
 def some_priorities(count: int, seed: int = 0) -> np.ndarray:
-    return np.float32(10.0 ** np.random.default_rng(seed).uniform(-3, 3, count)).astype(np.float64)
+    return (10.0 ** np.random.default_rng(seed).uniform(-3, 3, count)).astype(np.float32).astype(np.float64)
 
 
 @pytest.mark.parametrize("alpha", [0.0, 0.4, 1.0])

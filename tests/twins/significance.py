@@ -4,11 +4,18 @@ Seeds are fixed, so a result does not change from run to run. Every p-value must
 are looked at in all tests together, so a correct program fails with a chance below 1e-4.
 """
 
+from typing import Any
+
 import numpy as np
 from scipy import stats
 
 ALPHA = 1e-4 / 200
 _FEWEST = 5.0  # expected count below which the chi-square law is a poor approximation
+
+
+def p_of(result: Any) -> float:
+    """The p-value of a result of SciPy's, whose types do not name it."""
+    return float(result.pvalue)
 
 
 def _pool_rare(observed, expected):
@@ -45,18 +52,18 @@ def same_law(first, second):
     table = np.stack([first, second])
     common = table.sum(axis=0) >= 2 * _FEWEST
     pooled = np.column_stack([table[:, common], table[:, ~common].sum(axis=1)])
-    return stats.chi2_contingency(pooled[:, pooled.sum(axis=0) > 0]).pvalue
+    return p_of(stats.chi2_contingency(pooled[:, pooled.sum(axis=0) > 0]))
 
 
 def mean_differs(samples, expected):
     """p-value of independent samples having the mean `expected`."""
     samples = np.asarray(samples, float)
-    return stats.ttest_1samp(samples, expected).pvalue
+    return p_of(stats.ttest_1samp(samples, expected))
 
 
 def means_differ(first, second):
     """p-value of two sets of independent samples having one mean."""
-    return stats.ttest_ind(first, second, equal_var=False).pvalue
+    return p_of(stats.ttest_ind(first, second, equal_var=False))
 
 
 def z(score):
