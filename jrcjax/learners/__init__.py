@@ -20,12 +20,10 @@ LEARNERS: dict[str, LearnerFactory] = {
     "dpr": dpr,
     "tlwd": tlwd,
 }
-GOES_ON_AS = {"dpr": "ddqn"}
-"""Learners that differ from another one in their start alone."""
 
 __all__ = [
-    "GOES_ON_AS", "LEARNERS", "Learner", "LearnerFactory", "Source", "Spec", "ddqn", "dpr", "make_learner",
-    "q_learning", "round_robin", "tlwd",
+    "LEARNERS", "Learner", "LearnerFactory", "Source", "Spec", "ddqn", "dpr", "make_learner", "q_learning",
+    "round_robin", "tlwd",
 ]  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Programs of a job: points x seeds advance together by a chunk of episodes, one XLA program per group and learner."""
+"""A job's programs: points x seeds x learners advance together by a chunk of episodes, as one XLA program per group."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jrcjax.config.paths import Points
-from jrcjax.learners import GOES_ON_AS, Source, Spec, make_learner
+from jrcjax.learners import Source, Spec, make_learner
 from jrcjax.learners.hparams import Config
 from jrcjax.training import parallel
 from jrcjax.training.rollout import AgentState, Log, init_agent, run_episodes
@@ -21,7 +21,6 @@ from jrcjax.types import Key
 from sweeps.engine.job import Group, Job
 
 _CHUNK = 20  # most episodes between two reports of progress: a few seconds
-_POINTS = 9  # of Figs. 6 to 8
 
 
 class Lanes(NamedTuple):
@@ -59,60 +58,40 @@ def chunk_of(episodes: int) -> int:
 
 
 class Program(NamedTuple):
-    """One learner's compiled functions over lanes."""
+    """Compiled functions over lanes."""
 
     start: Callable
-    """(points, (keys, sources, points' numbers)) to the agents before their first episode."""
+    """(points, (keys, sources, points' numbers)) to the agents of all learners before their first episode."""
     advance: Callable
     """((points, number of the first episode), lanes = (agents, points' numbers)) to the lanes a chunk later, which take
     the memory of the old ones, and their log."""
-    needs_source: bool
-    """Whether `start` takes sources; it takes None if not."""
 
 
 @functools.cache
-def program_of(learner: str, spec: Spec, config: Config, chunk: int) -> Program:
-    """The program of a learner in environments of one shape.
+def program_of(learners: tuple[str, ...], spec: Spec, config: Config, chunk: int) -> Program:
+    """The program of these learners in environments of one shape.
 
-    Each learner has its own, so that all sweeps with this learner share it, whatever others they have beside it. It is
-    the same object for all of them and compiles once for a shape.
+    It is the same object for all blocks, and for all sweeps with these learners, so it compiles once for a shape.
     """
-    rule = make_learner(learner, spec, config)
+    rules = {name: make_learner(name, spec, config) for name in learners}
+
+    def at(points: Points, point) -> Points:
+        # A single point is shared by all lanes, and its bank of placements with it.
+        return jax.tree.map(lambda a: a[0] if a.shape[0] == 1 else a[point], points)
 
     def start(points, lane):
         key, source, point = lane
-        return init_agent(key, _at(points, point).hparams, rule, source)
-
-    advance = _advance_of(GOES_ON_AS.get(learner, learner), spec, config, chunk)
-    return Program(parallel.over_agents(start), advance, rule.needs_source)
-
-
-@functools.cache
-def _advance_of(learner: str, spec: Spec, config: Config, chunk: int) -> Callable:
-    rule = make_learner(learner, spec, config)
+        return {name: init_agent(key, at(points, point).hparams, rule, source) for name, rule in rules.items()}
 
     def advance(shared, lane):
         points, first = shared
-        agent, point = lane
-        agent, log = run_episodes(agent, first, chunk, *_at(points, point), rule)
-        return (agent, point), log
+        agents, point = lane
+        params, hparams = at(points, point)
+        done = {n: run_episodes(agents[n], first, chunk, params, hparams, rule) for n, rule in rules.items()}
+        agents, logs = ({n: of_learner[i] for n, of_learner in done.items()} for i in (0, 1))
+        return (agents, point), logs
 
-    return parallel.over_agents(advance, in_place=True)
-
-
-def _at(points: Points, point: jax.Array) -> Points:
-    # A single point is shared by all lanes, and its bank of placements with it.
-    return jax.tree.map(lambda a: a[0] if a.shape[0] == 1 else a[point], points)
-
-
-def filled_up(points: Points) -> Points:
-    """Points, the last repeated up to a multiple of _POINTS, so that sweeps of a few points share programs.
-
-    A single point stays alone, since programs are faster that know it.
-    """
-    number = points.hparams.discount.shape[0]
-    rows = np.minimum(np.arange(-(-number // _POINTS) * _POINTS), number - 1)
-    return points if number == 1 else jax.tree.map(lambda leaf: jnp.asarray(np.asarray(leaf)[rows]), points)
+    return Program(parallel.over_agents(start), parallel.over_agents(advance, in_place=True))
 
 
 def keys_of(seeds: np.ndarray) -> Key:
@@ -149,28 +128,17 @@ def advance(job: Job, seeds: range, source: Source | None) -> Iterator[Chunk]:
 
 def _advance_group(job: Job, group: Group, lanes: Lanes, source: Source | None) -> Iterator[Chunk]:
     episodes = group.config.episodes
-    chunk = chunk_of(episodes)
-    points = filled_up(job.points)  # all of them, so that groups of any number have the same shapes
-    programs = {name: program_of(name, job.spec, group.config, chunk) for name in job.sweep.learners}
+    chunk, points = chunk_of(episodes), job.points  # all of them, so that groups of any number have the same shapes
+    program = program_of(job.sweep.learners, job.spec, group.config, chunk)
     of_lane: Any = jax.tree.map(lambda leaf: leaf[job.source_points[lanes.points], lanes.seeds], source)
-    batches = [
-        {name: _started(program, points, batch) for name, program in programs.items()}
-        for batch in parallel.groups((lanes.keys, of_lane, jnp.asarray(lanes.points)))
-    ]
+    started = parallel.groups((lanes.keys, of_lane, jnp.asarray(lanes.points)))
+    batches = [(program.start(points, batch), batch[2]) for batch in started]
+    del started
     for first in range(0, episodes, chunk):
-        shared = points, jnp.int32(first)
-        advanced = [{n: programs[n].advance(shared, lane) for n, lane in batch.items()} for batch in batches]
-        batches = [{name: lane for name, (lane, _) in batch.items()} for batch in advanced]
-        log = lanes.unpadded(joined([{name: log for name, (_, log) in batch.items()} for batch in advanced]))
-        agents = [{name: agent for name, (agent, _) in batch.items()} for batch in batches]
-        yield Chunk(group, lanes, chunk, log, agents)
-
-
-def _started(program: Program, points: Points, batch: tuple[Key, Source | None, jax.Array]) -> tuple[Any, jax.Array]:
-    """The lanes of a learner before the first episode: agents, and points' numbers, a copy since lanes are donated."""
-    keys, source, of_points = batch
-    agents = program.start(points, (keys, source if program.needs_source else None, of_points))
-    return agents, jnp.copy(of_points)
+        advanced = [program.advance((points, jnp.int32(first)), batch) for batch in batches]
+        batches = [batch for batch, _ in advanced]
+        log = lanes.unpadded(joined([log for _, log in advanced]))
+        yield Chunk(group, lanes, chunk, log, [agents for agents, _ in batches])
 
 
 def joined(batches: list[Any]) -> Any:
