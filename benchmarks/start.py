@@ -2,7 +2,7 @@
 
 From import to the first trained episode it takes less than 5 s, and less than 2 s from then on. All but set-up is
 measured in processes of their own, first with an empty folder of compiled programs, then with what is there after it.
-Of each sweep only the compiling of its learners' programs is timed.
+Of each figure's sweep only the compiling of its program is timed.
 """
 
 from __future__ import annotations
@@ -39,6 +39,7 @@ jax.block_until_ready(jax.jit(train)(key, params))
 """,
 }
 """What a process runs, all of which counts."""
+_SWEEPS = ("fig5b", "fig5a", "fig6", "fig7", "fig8", "fig9")
 _SWEEP = """
 import sys, time
 from jrcjax.training import parallel
@@ -50,7 +51,7 @@ from sweeps.studies import registry
 from sweeps.sweep import Size
 sweep = registry.SWEEPS[sys.argv[1]]
 job = Job(sweep, Size())
-points, config = program.filled_up(job.points), job.groups[0].config
+points, config = job.points, job.groups[0].config
 lanes = parallel.padded(1)  # of every group
 source = None
 if sweep.source:
@@ -61,21 +62,17 @@ if sweep.source:
 keys = program.keys_of(np.arange(lanes))
 where = jax.ShapeDtypeStruct((lanes,), "int32")
 begin = time.perf_counter()
-for name in sweep.learners:
-    compiled = program.program_of(name, job.spec, config, program.chunk_of(config.episodes))
-    lane = keys, source if compiled.needs_source else None, where
-    start = compiled.start.lower(points, lane)
-    agents = jax.eval_shape(compiled.start, points, lane)
-    start.compile()
-    compiled.advance.lower((points, jax.ShapeDtypeStruct((), "int32")), (agents, where)).compile()
+compiled = program.program_of(sweep.learners, job.spec, config, program.chunk_of(config.episodes))
+lane = keys, source, where
+compiled.start.lower(points, lane).compile()
+agents = jax.eval_shape(compiled.start, points, lane)
+compiled.advance.lower((points, jax.ShapeDtypeStruct((), "int32")), (agents, where)).compile()
 print(time.perf_counter() - begin)
 """
 
 
 def run(quick: bool) -> list[Result]:
     """Measures all parts, cold and warm, and prints a table; a quick run leaves set-up and most sweeps out."""
-    from sweeps.studies.registry import SWEEPS
-
     if not quick:
         print(f"{'set-up with pip':28s}{_set_up():8.1f} s", flush=True)
     print(f"{'s':>28s}{'cold':>8s}{'again':>8s}")
@@ -83,7 +80,7 @@ def run(quick: bool) -> list[Result]:
         for number, (name, code) in enumerate(_PARTS.items()):
             _row(name, Path(folder, str(number)), "-c", code)
         _row("all figures, tiny version", Path(folder, "figures"), "-m", "paper_figs", "--smoke", "--out")
-        for name in ("fig5b",) if quick else SWEEPS:
+        for name in _SWEEPS[:1] if quick else _SWEEPS:
             _row(f"compiling {name}", Path(folder, "sweeps"), "-c", _SWEEP, name)
     return []
 
