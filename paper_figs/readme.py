@@ -175,9 +175,9 @@ def headline(published: Path) -> str:
     tally = ", ".join(f"{counts[each]} are {each}" for each in VERDICTS)
     text = (
         f"Of the {len(found)} statements that the paper's claims come down to, {tally} under the default readings. "
-        f"That TLwD converges faster than DDQN is {verdict['C3 (TLwD)']}; that it earns most at every point is "
-        f"{verdict['C5 (highest)']} in Fig. 6 and {verdict['C13 (highest)']} in Fig. 8. After episode 400 the policies "
-        f"in the target are below the exact optimum by: {_gaps_of(numbers, 'late', ('tlwd', 'dpr', 'ddqn'))}."
+        f"That TLwD converges faster than DDQN is {verdict['C3 (TLwD)']}; that it earns most at every point of Fig. 6 "
+        f"is {verdict['C5 (highest)']}, of Fig. 8 {verdict['C13 (highest)']}. After episode 400 the policies in the "
+        f"target are below the exact optimum by: {_gaps_of(numbers, 'late', ('tlwd', 'dpr', 'ddqn'))}."
     )
     return wrapped(text)[2:].replace("\n  ", "\n")
 
