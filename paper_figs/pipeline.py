@@ -71,7 +71,8 @@ def make_figures(
     folder = results_folder(out, size)
     seconds = expected_seconds([SWEEPS[figure.name] for figure in wanted], size, folder)
     console.print(
-        f"figures: {len(wanted)}, seeds: {size.seeds}, episodes: {size.episodes}; about {in_words(seconds)} in all"
+        f"figures: {len(wanted)}, seeds: {size.seeds}, episodes: {size.episodes}; "
+        f"about {in_words(seconds)} in all, and what has to be compiled"
     )
     written, results, slots = _Written(), {}, slots_of(size.preset)
     for figure in wanted:

@@ -12,7 +12,7 @@ from jrcjax import files
 from jrcjax.learners import Source
 from jrcjax.machine import usable_cores
 from sweeps import progress
-from sweeps.engine import estimate
+from sweeps.engine import estimate, pace
 from sweeps.engine.block import Block, block_of
 from sweeps.engine.job import Job
 from sweeps.engine.program import Chunk, advance
@@ -132,19 +132,26 @@ class _Shown:
 
     def __init__(self, told: Callable[[float], None]):
         self._told = told
+        self._compiled = set()
+        self.stopwatch = pace.Stopwatch()
 
     def compute(self, job: Job, seeds: range, source: Source | None) -> Block:
         return block_of(job, seeds, self._chunks(job, seeds, source))
 
     def _chunks(self, job: Job, seeds: range, source: Source | None) -> Iterator[Chunk]:
         started = set()
+        self.stopwatch.start()
         for chunk in advance(job, seeds, source):
             seconds = chunk.episodes * estimate.seconds_per_episode(job, chunk.group, len(seeds))
             if chunk.group not in started:
                 seconds += estimate.pretraining_seconds(job, chunk.group, len(seeds))
+            program = job.sweep.name, chunk.group
+            self.stopwatch.lap(seconds, is_first=program not in self._compiled)
             started.add(chunk.group)
+            self._compiled.add(program)
             self._told(seconds)
             yield chunk
+            self.stopwatch.start()
 
 
 def _run_here(job: Job, out: Path, console: Console, seconds: float, save_agents: bool) -> None:
@@ -154,6 +161,7 @@ def _run_here(job: Job, out: Path, console: Console, seconds: float, save_agents
         for seeds in to_do(job, out):
             source = sources_of(job.source, seeds, out, shown.compute) if job.source else None
             save(shown.compute(job, seeds, source), job, out, save_agents)
+        shown.stopwatch.keep()
 
 
 def _run_on_cluster(client: Any, job: Job, out: Path, console: Console, save_agents: bool, patience: float) -> None:
@@ -173,5 +181,6 @@ def _announcement(job: Job, todo: list[range], seconds: float) -> str:
     programs = f" in {len(job.groups)} programs" if len(job.groups) > 1 else ""
     return (
         f"{job.sweep.name}: {agents} agents (points x seeds x learners){programs}, {job.size.episodes} episodes each; "
-        f"expected {estimate.in_words(seconds)} with {usable_cores()} cores, and half a minute of compiling"
+        f"expected {estimate.in_words(seconds)} with {usable_cores()} cores; "
+        f"compiling, if no earlier run did: {estimate.in_words(estimate.compiling_seconds(job))}"
     )
