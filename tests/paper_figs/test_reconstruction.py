@@ -110,18 +110,22 @@ def test_what_decides_code_stays_as_it_is_at_the_start():
 def test_the_best_of_a_multiverse_are_starts_and_may_be_chosen(tmp_path):
     folder = tmp_path / "multiverse" / "summary"
     folder.mkdir(parents=True)
+    best = PER_BLOCK + 1
     rows = [
         verdicts_of(np.arange(len(CLAIMS)) < held).assign(reading=number)
-        for number, held in {0: 5, 17: 20, 18: 19, 40: 3}.items()
+        for number, held in {0: 5, best: 20, best + 1: 19, 2 * PER_BLOCK: 3}.items()
     ]
     pd.concat(rows).to_csv(folder / "verdicts.csv", index=False)
     known = reconstruction._of_multiverse(tmp_path)
-    assert [one.name for one in known] == ["default", "multiverse 17", "multiverse 18", "multiverse 40"]
+    assert [one.name for one in known] == [
+        "default",
+        *(f"multiverse {number}" for number in (best, best + 1, 2 * PER_BLOCK)),
+    ]
     starts = reconstruction._starts(known, Effort(starts=2))
-    np.testing.assert_array_equal(starts[0], unit_of(1, 17)[0])  # and not 18, which is in the same block
+    np.testing.assert_array_equal(starts[0], unit_of(1, best)[0])  # and not the next, of the same block
     np.testing.assert_array_equal(starts[1], default_unit())
-    (best, what), *_ = reconstruction.choice_of(known)
-    assert best.name == "multiverse 17"
+    (chosen, what), *_ = reconstruction.choice_of(known)
+    assert chosen.name == f"multiverse {best}"
     assert what[0] == "all"
     assert best.agreement == pytest.approx(10 / 15)
 
