@@ -127,7 +127,7 @@ def test_the_best_of_a_multiverse_are_starts_and_may_be_chosen(tmp_path):
     (chosen, what), *_ = reconstruction.choice_of(known)
     assert chosen.name == f"multiverse {best}"
     assert what[0] == "all"
-    assert best.agreement == pytest.approx(10 / 15)
+    assert chosen.agreement == pytest.approx(10 / 15)
 
 
 def test_agreement_weighs_claims_and_not_statements():
