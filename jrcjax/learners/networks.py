@@ -8,14 +8,17 @@ are the same up to rounding. `benchmarks/README.md` has the gains.
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable
 from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from flax import linen as nn
 
-from jrcjax.types import Float, Int
+from jrcjax.readings import Initialiser
+from jrcjax.types import Float, Int, Key
 
 _SHORT = 8  # sums of at most so many products are added up in one loop, which XLA joins with what surrounds it
 
@@ -62,22 +65,27 @@ def _dense_backward(relu: bool, saved: tuple[Float, Float, Float], gradient: Flo
 dense.defvjp(_dense_forward, _dense_backward)
 
 
-_AXES = {"in_axis": 1, "out_axis": 0}  # of a kernel [out, in]
-_INITIALISERS = (
-    nn.initializers.lecun_normal(**_AXES),
-    nn.initializers.glorot_uniform(**_AXES),
-    nn.initializers.he_normal(**_AXES),
-)  # in the order of jrcjax.readings.Initialiser
+_TRUNCATED_AT = 2.0  # standard deviations
+_STD_OF_TRUNCATED = 0.87962566103423978  # of a standard normal variable between -2 and 2
 
 
-def kernel_initialiser(choice: Int | int) -> Callable:
-    """The initialiser of kernels [out, in] of that number in `Initialiser`; it may be traced."""
+def initial_kernel(key: Key, shape: tuple[int, int], choice: Int | int = 0) -> Float:
+    """A random kernel [out, in] from the initialiser of that number in `Initialiser`, which may be traced.
 
-    def init(key, shape, dtype=jnp.float32):
-        branches = [functools.partial(each, shape=shape, dtype=dtype) for each in _INITIALISERS]
-        return jax.lax.switch(choice, branches, key)
-
-    return init
+    The values are those of `jax.nn.initializers`. All of them start from the same uniform numbers, so that one draw
+    serves a choice that is only known when the program runs; a draw for each would take most of the time to compile.
+    """
+    fan_out, fan_in = shape
+    variance = np.array([1 / fan_in, 2 / (fan_in + fan_out), 2 / fan_in], np.float32)
+    factors = np.stack([np.sqrt(variance) / np.float32(_STD_OF_TRUNCATED), np.sqrt(3 * variance)])
+    of_normal, of_uniform = jnp.asarray(factors)[:, choice]
+    share = jax.random.uniform(key, shape)
+    edge = jax.lax.erf(jnp.float32(_TRUNCATED_AT / math.sqrt(2)))
+    normal = jnp.float32(math.sqrt(2)) * jax.lax.erf_inv(jnp.maximum(-edge, share * (2 * edge) - edge))
+    inside = jnp.nextafter(jnp.float32(_TRUNCATED_AT), jnp.float32(0.0))
+    normal = jnp.clip(normal, -inside, inside) * of_normal
+    uniform = jnp.maximum(-1.0, share * 2.0 - 1.0) * of_uniform
+    return jnp.where(choice == Initialiser.GLOROT_UNIFORM, uniform, normal)
 
 
 class ColumnDense(nn.Module):
@@ -100,7 +108,7 @@ class QNetwork(nn.Module):
 
     num_actions: int
     hidden: tuple[int, ...]
-    kernel_init: Callable = _INITIALISERS[0]
+    kernel_init: Callable = initial_kernel
 
     @nn.compact
     def __call__(self, features: Float) -> Float:

@@ -7,6 +7,7 @@ Inside, tables have one column per state, [A, S], as the network computes them.
 
 from __future__ import annotations
 
+import functools
 from typing import Any, NamedTuple
 
 import jax
@@ -15,7 +16,7 @@ import numpy as np
 
 from jrcjax.learners.base import Spec
 from jrcjax.learners.hparams import Config, HParams
-from jrcjax.learners.networks import QNetwork, kernel_initialiser
+from jrcjax.learners.networks import QNetwork, initial_kernel
 from jrcjax.learners.value_learning import double_q_value
 from jrcjax.model import states
 from jrcjax.types import Float, Int, Key
@@ -33,7 +34,7 @@ class QFunction(NamedTuple):
 
     def init(self, key: Key, initialiser: Int | int = 0) -> Any:
         """Random weights, from the `Initialiser` of that number."""
-        network = self.network.clone(kernel_init=kernel_initialiser(initialiser))
+        network = self.network.clone(kernel_init=functools.partial(initial_kernel, choice=initialiser))
         return network.init(key, jnp.zeros((len(self.shape), 1), jnp.float32))
 
     def columns(self, weights: Any, ids: Int | None = None) -> Float:

@@ -1,0 +1,31 @@
+import functools
+
+import jax
+import numpy as np
+import pytest
+
+from jrcjax.learners.networks import initial_kernel
+from jrcjax.readings import Initialiser
+
+AXES = {"in_axis": 1, "out_axis": 0}
+OF_JAX = {
+    Initialiser.LECUN_NORMAL: jax.nn.initializers.lecun_normal(**AXES),
+    Initialiser.GLOROT_UNIFORM: jax.nn.initializers.glorot_uniform(**AXES),
+    Initialiser.HE_NORMAL: jax.nn.initializers.he_normal(**AXES),
+}
+
+
+@pytest.mark.parametrize("choice", Initialiser, ids=Initialiser.names())
+@pytest.mark.parametrize("shape", [(24, 5), (4, 24), (40, 24), (1, 1)], ids=str)
+def test_kernels_are_those_of_jax(choice, shape):
+    keys = jax.random.split(jax.random.key(7), 50)
+    found = jax.jit(jax.vmap(functools.partial(initial_kernel, shape=shape, choice=choice)))(keys)
+    wanted = jax.jit(jax.vmap(functools.partial(OF_JAX[choice], shape=shape)))(keys)
+    np.testing.assert_array_equal(found, wanted)
+
+
+def test_the_choice_may_be_traced():
+    key, shape = jax.random.key(3), (24, 5)
+    found = jax.jit(jax.vmap(functools.partial(initial_kernel, key, shape)))(np.arange(3))
+    wanted = [jax.jit(functools.partial(OF_JAX[choice], shape=shape))(key) for choice in Initialiser]
+    np.testing.assert_array_equal(found, wanted)
