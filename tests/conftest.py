@@ -14,6 +14,7 @@ from jrcjax.radar.bank import make_radar
 from jrcjax.training import parallel
 
 jax.config.update("jax_num_cpu_devices", 2)  # nothing above makes an array
+parallel.set_flags()  # those of commands, so that both find each other's programs
 parallel.keep_compiled()  # most of the time goes into compiling, often of what another process compiled before
 
 PAPER = [(environment, preset) for preset in ("paper", "paper_table") for environment in ("source", "target")]

@@ -159,7 +159,7 @@ def test_gymnax_contract():
     _, state = env.reset(key, params)
     for i in range(4):
         ours = env.step(jax.random.key(i), state, i % 4, params)
-        theirs = Environment.step.__wrapped__(env_like(env), jax.random.key(i), state, i % 4, params)
+        theirs = inspect.unwrap(Environment.step)(env_like(env), jax.random.key(i), state, i % 4, params)
         assert len(ours) == len(theirs) == 6
         assert ours[-1].keys() == theirs[-1].keys()
         jax.tree.map(np.testing.assert_array_equal, ours, theirs)
