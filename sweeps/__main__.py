@@ -57,6 +57,9 @@ class Run:
     readings: Count = None
     """Of the multiverse and of the reconstruction, how many readings of the paper. Default: 512 and 336, or 2 and 4
     with --smoke."""
+    first: int = 0
+    """Of the multiverse, the first reading to run, a multiple of 64; those before it are taken from its summary in
+    OUT/multiverse/summary, which an earlier run wrote."""
     confirm: Count = None
     """Of the reconstruction, how many fresh seeds confirm what it found. Default: 100, or 1 with --smoke."""
     custom: tyro.conf.OmitArgPrefixes[Options] = field(default_factory=Options)
@@ -104,6 +107,7 @@ def _run(command: Command) -> int:
     console = begin()
     from jrcjax.types import choice
     from sweeps.engine.run import run_sweep
+    from sweeps.studies import multiverse
     from sweeps.studies.reconstruction import effort_of
 
     if isinstance(command, Verify):
@@ -113,6 +117,8 @@ def _run(command: Command) -> int:
     study = _study(command, preset)
     size = size_of(command.seeds, command.episodes, preset, command.smoke, study)
     size.check()
+    if command.first:
+        multiverse.require_earlier(command.first, size.seeds, command.out)
     sweeps = study.smoke_sweeps if command.smoke and study.smoke_sweeps else study.sweeps
     require_integer("wait", command.wait, 0)
     options = {"resume": command.resume, "save_agents": command.save_agents, "patience": command.wait}
@@ -141,8 +147,8 @@ def _study(command: Run, preset: str) -> Study:
     from sweeps.studies.registry import EVERY_SWEEP, STUDIES
 
     of_readings = (multiverse.MULTIVERSE.name, reconstruction.NAME)
-    for option, names in {"readings": of_readings, "confirm": of_readings[1:]}.items():
-        if getattr(command, option) is not None and command.name not in names:
+    for option, names in {"readings": of_readings, "first": of_readings[:1], "confirm": of_readings[1:]}.items():
+        if getattr(command, option) != getattr(Run, option) and command.name not in names:
             refuse("name", command.name, f"{' or '.join(names)}, for which alone --{option} is")
     if command.name == CUSTOM:
         sweep = custom_sweep(command.custom, preset, (*STUDIES, *EVERY_SWEEP))
@@ -151,7 +157,7 @@ def _study(command: Run, preset: str) -> Study:
     if given:
         refuse("name", command.name, f"{CUSTOM}, for which alone --{given[0].replace('_', '-')} is")
     if command.name == multiverse.MULTIVERSE.name:
-        return multiverse.study_of(command.readings, command.smoke)
+        return multiverse.study_of(command.readings, command.smoke, command.first)
     return STUDIES[command.name]
 
 

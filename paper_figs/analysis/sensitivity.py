@@ -11,6 +11,7 @@ from __future__ import annotations
 import itertools
 import math
 import warnings
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,7 +22,8 @@ _FOLDS = 10
 _INTEGRAL = 1024  # points of the integrals, a power of two
 _RESAMPLES = 100  # of these points, for the error of the integrals
 _LEVELS = 12  # most values of an input that is taken as a list of levels
-_MOST_FOR_GAUSSIAN = 1500  # points, whose cube the fit takes
+_MOST_FOR_GAUSSIAN = 1500  # points, whose cube a fit takes
+_MOST_FOR_LENGTHS = 256  # points that the process's lengths are chosen by, which takes hundreds of fits
 LEAST_POINTS = 3 * _FOLDS
 """Points below which there are no indices."""
 
@@ -56,7 +58,7 @@ def sensitivity(
       output: [points].
       seed: of the surrogate and of the integrals.
       blocks: number of each point's block [points], if some inputs are the same within blocks (a split-plot design):
-        a block's points are then left out together.
+        a block's points are then left out together, if there are several blocks.
 
     Raises:
       ValueError: for fewer than `LEAST_POINTS` points.
@@ -74,10 +76,11 @@ def sensitivity(
     kind = min(fitted, key=lambda name: fitted[name][1])
     (models, error), whole = fitted[kind], wholes[kind]
     design = _Design(ranks, seed)
-    tops = _largest(design.of(whole, []).total)
-    pairs = list(itertools.combinations(tops, 2))
-    full, error_of_integral = design.of(whole, pairs), design.error_of(whole, pairs)
-    without = [design.of(model, pairs) for model in models]
+    outputs = design.outputs(whole, [])
+    pairs = list(itertools.combinations(_largest(_estimate(outputs, []).total), 2))
+    outputs = np.concatenate([outputs, design.mixed(whole, pairs)])
+    full, error_of_integral = _estimate(outputs, pairs), _error_of_integral(outputs, pairs, seed)
+    without = [_estimate(design.outputs(model, pairs), pairs) for model in models]
     limits = {
         name: _interval(getattr(full, name), [getattr(w, name) for w in without], getattr(error_of_integral, name))
         for name in _Estimate._fields
@@ -92,8 +95,10 @@ def sensitivity(
 
 
 def _folds(blocks: np.ndarray, seed: int) -> np.ndarray:
-    """Number of each point's fold; points of one block share theirs."""
+    """Number of each point's fold; points of one block share theirs, unless there is no other block to leave in."""
     known, places = np.unique(blocks, return_inverse=True)
+    if len(known) == 1:
+        return _folds(np.arange(len(blocks)), seed)
     return (np.random.default_rng(seed).permutation(len(known)) % _FOLDS)[places]
 
 
@@ -120,8 +125,9 @@ def _surrogates(x: np.ndarray, y: np.ndarray, seed: int) -> dict[str, Any]:
         of_inputs = ConstantKernel(1.0, (1e-3, 1e3)) * RBF(np.ones(x.shape[1]), (0.05, 1e3))  # pyright: ignore[reportArgumentType]
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ConvergenceWarning)  # a length at its limit: an input that does not matter
-            model = GaussianProcessRegressor(of_inputs + WhiteKernel(0.1, (1e-6, 10.0))).fit(x, y)
-        found["gaussian process"] = model.set_params(kernel=model.kernel_, optimizer=None)  # as it is in the folds
+            some = np.random.default_rng(seed).permutation(len(y))[:_MOST_FOR_LENGTHS]
+            chosen = GaussianProcessRegressor(of_inputs + WhiteKernel(0.1, (1e-6, 10.0))).fit(x[some], y[some])
+        found["gaussian process"] = GaussianProcessRegressor(chosen.kernel_, optimizer=None).fit(x, y)  # pyright: ignore[reportArgumentType]
     return found
 
 
@@ -153,30 +159,32 @@ class _Design:
         unit = stats.qmc.Sobol(2 * dimensions, rng=np.random.default_rng(seed)).random(_INTEGRAL)
         quantiles = np.stack([_on_levels(unit[:, i], ranks[:, i % dimensions]) for i in range(2 * dimensions)], axis=1)
         self._a, self._b = quantiles[:, :dimensions], quantiles[:, dimensions:]
-        self._seed = seed
 
-    def of(self, model: Any, pairs: list[tuple[int, int]]) -> _Estimate:
-        """The indices of a surrogate."""
-        return _estimate(self._outputs(model, pairs), pairs, np.arange(_INTEGRAL))
-
-    def error_of(self, model: Any, pairs: list[tuple[int, int]]) -> _Estimate:
-        """Standard errors of the integrals, by resampling their points."""
-        outputs, rng = self._outputs(model, pairs), np.random.default_rng(self._seed)
-        found = [_estimate(outputs, pairs, rng.integers(_INTEGRAL, size=_INTEGRAL)) for _ in range(_RESAMPLES)]
-        return _Estimate(*(np.std([getattr(f, name) for f in found], axis=0) for name in _Estimate._fields))
-
-    def _outputs(self, model: Any, pairs: list[tuple[int, int]]) -> np.ndarray:
+    def outputs(self, model: Any, pairs: list[tuple[int, int]]) -> np.ndarray:
         """Of A, of B, of B with each input from A, and of B with each pair from A, [2 + inputs + pairs, points]."""
-        mixed = [self._a, self._b]
-        for columns in [(i,) for i in range(self._a.shape[1])] + pairs:
+        single = [(i,) for i in range(self._a.shape[1])]
+        ends = model.predict(np.concatenate([self._a, self._b])).reshape(2, -1)
+        return np.concatenate([ends, self.mixed(model, single + pairs)])
+
+    def mixed(self, model: Any, sets: Sequence[tuple[int, ...]]) -> np.ndarray:
+        """Of B with each set of inputs from A, [sets, points]."""
+        points = []
+        for columns in sets:
             other = self._b.copy()
             other[:, columns] = self._a[:, columns]
-            mixed.append(other)
-        return model.predict(np.concatenate(mixed)).reshape(len(mixed), -1)
+            points.append(other)
+        return model.predict(np.concatenate(points)).reshape(len(sets), -1)
 
 
-def _estimate(outputs: np.ndarray, pairs: list[tuple[int, int]], chosen: np.ndarray) -> _Estimate:
-    a, b, *mixed = outputs[:, chosen]
+def _error_of_integral(outputs: np.ndarray, pairs: list[tuple[int, int]], seed: int) -> _Estimate:
+    """Standard errors of the integrals, by resampling their points."""
+    rng = np.random.default_rng(seed)
+    found = [_estimate(outputs[:, rng.integers(_INTEGRAL, size=_INTEGRAL)], pairs) for _ in range(_RESAMPLES)]
+    return _Estimate(*(np.std([getattr(f, name) for f in found], axis=0) for name in _Estimate._fields))
+
+
+def _estimate(outputs: np.ndarray, pairs: list[tuple[int, int]]) -> _Estimate:
+    a, b, *mixed = outputs
     variance = np.concatenate([a, b]).var()
     if variance < 1e-12:
         return _Estimate(*(np.zeros(n) for n in (len(mixed) - len(pairs), len(mixed) - len(pairs), len(pairs))))

@@ -13,6 +13,7 @@ from paper_figs.analysis.intervals import proportion_effect
 from paper_figs.analysis.sensitivity import LEAST_POINTS, sensitivity
 from paper_figs.claims.judge import Judgement, is_on_its_side
 from paper_figs.claims.table import CLAIMS, claims_of, number_of
+from paper_figs.cores import on_cores
 from paper_figs.plots import readings as plot
 from sweeps.studies.multiverse import POINTS
 from sweeps.studies.readings import PER_BLOCK, READINGS, range_of, unit_of, values_at
@@ -110,16 +111,17 @@ def _inputs(number: int) -> pd.DataFrame:
 
 def decisive(found: pd.DataFrame) -> dict[str, pd.DataFrame]:
     """Sensitivity indices of each claim's effect over the readings, and interactions of its three strongest ones."""
-    tables: dict[str, list[pd.DataFrame]] = {"sensitivity": [], "interactions": []}
     sampled = found.query("reading > 0")  # reading 0 is the default and no point of the sample
+    sampled = sampled[np.isfinite(sampled.value.to_numpy(float))]
     inputs = _inputs(int(found.reading.max()) + 1)
-    for claim, of_claim in sampled.groupby("claim", sort=False):
-        known = of_claim[np.isfinite(of_claim.value.to_numpy(float))]
-        if len(known) < LEAST_POINTS:
-            continue
-        numbers = known.reading.to_numpy(int)
-        indices = sensitivity(inputs.loc[numbers], known.value.to_numpy(float), blocks=numbers // PER_BLOCK)
-        about = {"claim": claim, "surrogate": indices.surrogate, "surrogate_error": indices.error}
-        tables["sensitivity"].append(indices.table.assign(**about))
-        tables["interactions"].append(indices.pairs.assign(claim=claim))
-    return {name: pd.concat(of) for name, of in tables.items() if of}
+    enough = [(c, of_claim) for c, of_claim in sampled.groupby("claim", sort=False) if len(of_claim) >= LEAST_POINTS]
+    tables = on_cores(_decisive, ((str(claim), of_claim, inputs) for claim, of_claim in enough))
+    return {name: pd.concat(t[name] for t in tables) for name in ("sensitivity", "interactions")} if enough else {}
+
+
+def _decisive(claim: str, of_claim: pd.DataFrame, inputs: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """`decisive` of one claim."""
+    numbers = of_claim.reading.to_numpy(int)
+    indices = sensitivity(inputs.loc[numbers], of_claim.value.to_numpy(float), blocks=numbers // PER_BLOCK)
+    about = {"claim": claim, "surrogate": indices.surrogate, "surrogate_error": indices.error}
+    return {"sensitivity": indices.table.assign(**about), "interactions": indices.pairs.assign(claim=claim)}

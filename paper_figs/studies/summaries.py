@@ -8,10 +8,12 @@ from pathlib import Path
 import pandas as pd
 
 from jrcjax.files import write_text
+from paper_figs.cores import on_cores
 from paper_figs.plots import readings, style
 from paper_figs.studies import multiverse, robustness
 from sweeps.preset import slots_of
 from sweeps.results import store
+from sweeps.studies.multiverse import verdicts_file
 from sweeps.studies.robustness import SOURCE, TARGET
 from sweeps.sweep import Size, Sweep
 
@@ -20,13 +22,16 @@ def _write(folder: Path, tables: dict[str, pd.DataFrame]) -> list[Path]:
     return [style.save_table(table, folder / f"{name}.csv") for name, table in tables.items()]
 
 
-def _manifests(folder: Path, sweeps: tuple[Sweep, ...], out: Path) -> Path:
-    """What reproduces the summary: the manifests of all results that it rests on."""
+def _manifests(folder: Path, sweeps: tuple[Sweep, ...], out: Path, earlier: bool = False) -> Path:
+    """What reproduces the summary: the manifests of all results that it rests on, and of earlier ones if it does."""
+    path = folder / "manifests.json"
     all_sweeps = [part for sweep in sweeps for part in (sweep, sweep.source) if part]
     found = {
         sweep.name: json.loads((out / sweep.name / store.MANIFEST).read_text(encoding="utf-8")) for sweep in all_sweeps
     }
-    return write_text(folder / "manifests.json", json.dumps(found, indent=1) + "\n")
+    if earlier:
+        found = json.loads(path.read_text(encoding="utf-8")) | found
+    return write_text(path, json.dumps(found, indent=1) + "\n")
 
 
 def summarise_robustness(sweeps: tuple[Sweep, ...], size: Size, out: Path) -> list[Path]:
@@ -40,18 +45,18 @@ def summarise_robustness(sweeps: tuple[Sweep, ...], size: Size, out: Path) -> li
 
 
 def summarise_multiverse(sweeps: tuple[Sweep, ...], size: Size, out: Path) -> list[Path]:
-    """Tables and figures of a multiverse, in OUT/multiverse/summary."""
-    folder = out / "multiverse" / "summary"
+    """Tables and figures of a multiverse, in OUT/multiverse/summary; readings before these sweeps stay as they are."""
+    path = verdicts_file(out)
+    folder = path.parent
     folder.mkdir(parents=True, exist_ok=True)
-    judged = []
-    for sweep in sweeps:
-        assert sweep.source
-        source, target = (store.load(out / part.name, size.seeds) for part in (sweep.source, sweep))
-        judged += multiverse.of_readings(source, target)
-    found = multiverse.verdicts(judged)
+    found = pd.concat(on_cores(_of_block, ((sweep, size, out) for sweep in sweeps)))
+    first = int(found.reading.min())
+    if first:
+        found = pd.concat([pd.read_csv(path).query("reading < @first"), found])
+    style.save_table(found, path)
+    found = pd.read_csv(path)  # so that conclusions are the same whether readings came from this run or an earlier one
     tables = {
-        "readings": multiverse.readings([number for number, _ in judged]),
-        "verdicts": found,
+        "readings": multiverse.readings(found.reading.unique().tolist()),
         "claims": multiverse.shares(found),
         **multiverse.decisive(found),
     }
@@ -59,4 +64,11 @@ def summarise_multiverse(sweeps: tuple[Sweep, ...], size: Size, out: Path) -> li
     if "sensitivity" in tables:
         pictures += style.save(readings.draw_decisive(tables["sensitivity"]), folder / "sensitivity")
         pictures += style.save(multiverse.specification(found, tables["sensitivity"]), folder / "specification")
-    return [*_write(folder, tables), *pictures, _manifests(folder, sweeps, out)]
+    return [path, *_write(folder, tables), *pictures, _manifests(folder, sweeps, out, earlier=first > 0)]
+
+
+def _of_block(sweep: Sweep, size: Size, out: Path) -> pd.DataFrame:
+    """The verdicts in a block's readings."""
+    assert sweep.source
+    source, target = (store.load(out / part.name, size.seeds) for part in (sweep.source, sweep))
+    return multiverse.verdicts(list(multiverse.of_readings(source, target)))

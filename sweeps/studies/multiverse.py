@@ -6,12 +6,14 @@ added, resumed, or sent to other machines.
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from jrcjax.checks import require_integer
+from jrcjax.checks import refuse, require_integer
 from jrcjax.training.transfer import TARGET_LEARNERS
 from sweeps import design
 from sweeps.studies import fig9
@@ -134,8 +136,8 @@ MULTIVERSE = Study(
 )
 
 
-def study_of(number: int | None, smoke: bool) -> Study:
-    """The study with so many readings.
+def study_of(number: int | None, smoke: bool, first: int = 0) -> Study:
+    """The study with so many readings, of which those before `first` are run already.
 
     Raises:
       ValueError: naming the argument, the value and what is allowed.
@@ -143,4 +145,24 @@ def study_of(number: int | None, smoke: bool) -> Study:
     usual = _SMOKE_NUMBER if smoke else _NUMBER
     number = usual if number is None else number
     require_integer("readings", number, 1, _MOST)
-    return MULTIVERSE.with_sweeps(sweeps_of(number))
+    if first not in range(0, number, PER_BLOCK):
+        refuse("first", first, f"a multiple of {PER_BLOCK} from 0 on, less than readings = {number}")
+    return MULTIVERSE.with_sweeps(sweeps_of(number - first, first))
+
+
+def verdicts_file(out: Path) -> Path:
+    """Where the summary of a multiverse keeps its verdicts, a row per reading and statement."""
+    return out / MULTIVERSE.name / "summary" / "verdicts.csv"
+
+
+def require_earlier(first: int, seeds: int, out: Path) -> None:
+    """Raises ValueError naming `first` unless the summary in `out` holds all readings before it, with these seeds."""
+    path = verdicts_file(out)
+    wanted = f"readings before it, seeds = {seeds}, in {path}"
+    if not path.is_file():
+        refuse("first", first, f"{wanted}, which is missing")
+    with path.open(encoding="utf-8", newline="") as file:
+        known = {int(row["reading"]) for row in csv.DictReader(file) if int(row["n_seeds"]) == seeds}
+    missing = sorted(set(range(first)) - known)
+    if missing:
+        refuse("first", first, f"{wanted}, where {missing[0]} and {len(missing) - 1} others are missing")

@@ -27,6 +27,16 @@ def test_the_indices_of_a_linear_function_lie_in_their_intervals():
     assert (found.pairs.interaction_low <= 1e-12).all()
 
 
+def test_the_points_of_a_block_are_left_out_together_unless_it_is_the_only_one():
+    inputs, output = sample(64, 0.2, lambda unit: unit[:, 0])
+    single = sensitivity(inputs, output, blocks=np.zeros(64))
+    pd.testing.assert_frame_equal(single.table, sensitivity(inputs, output).table)
+    # A surrogate that sees the others of a block knows its level; one that doesn't has to guess it.
+    inputs["a"], of_blocks = np.arange(64) // 16, np.repeat([0.0, 2.0, 1.0, -1.0], 16)
+    together = sensitivity(inputs, of_blocks, blocks=np.arange(64) // 16)
+    assert together.error > 0.5 > sensitivity(inputs, of_blocks).error
+
+
 def test_an_interaction_is_told_from_what_inputs_do_alone():
     # The product of two centred inputs is all interaction.
     found = sensitivity(*sample(128, 0.0, lambda unit: (unit[:, 0] - 0.5) * (unit[:, 1] - 0.5)))

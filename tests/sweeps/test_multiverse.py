@@ -1,16 +1,21 @@
 """The multiverse: readings are what they are whatever their number, and a tiny run judges all claims."""
 
+import json
+
 import jax
+import joblib
 import numpy as np
 import pandas as pd
 import pytest
 
 import jrcjax
 from jrcjax.config.paths import number_at, parameter_at
+from paper_figs.studies import summaries
 from sweeps.__main__ import main
 from sweeps.engine.job import Job
 from sweeps.preset import base_of
-from sweeps.studies.multiverse import POINTS, SMOKE, sweeps_of
+from sweeps.results import store
+from sweeps.studies.multiverse import POINTS, SMOKE, require_earlier, sweeps_of
 from sweeps.studies.readings import (
     PER_BLOCK,
     READINGS,
@@ -24,6 +29,7 @@ from sweeps.studies.readings import (
     values_at,
 )
 from sweeps.studies.registry import SWEEPS
+from sweeps.sweep import Size
 
 
 def test_a_reading_is_the_same_whatever_the_number_of_readings():
@@ -98,6 +104,74 @@ def test_a_tiny_multiverse_judges_all_claims_in_each_reading(tmp_path):
     assert {claim.split()[0] for claim in found.claim} == {f"C{number}" for number in range(1, 16)}
     assert (pd.read_csv(summary / "claims.csv").readings == 2).all()
     assert main([*run, "--resume"]) == 0
+
+
+@pytest.fixture
+def made_up(monkeypatch, tmp_path):
+    """A world in which results are a function of the reading, without a run."""
+
+    def of_block(sweep, size, out):
+        numbers = [int(number) for number in sweep.source.design.values("reading")]
+        rng = [np.random.default_rng(number) for number in numbers]
+        rows = [
+            {"reading": n, "claim": claim, "value": r.normal() + n / 100, "ci_low": -1.0, "ci_high": np.nan}
+            | {"verdict": "undecided", "holds": bool(n % 2), "negligible": None, "n_seeds": size.seeds}
+            for n, r in zip(numbers, rng, strict=True)
+            for claim in ("C3 (TLwD)", "C5 (highest)", "C8 (miss detection, DDQN)")
+        ]
+        return pd.DataFrame(rows)
+
+    def summarise(folder, number, first=0):
+        for sweep in sweeps_of(number, first):
+            for part in (sweep, sweep.source):
+                path = tmp_path / folder / part.name / store.MANIFEST
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_text(json.dumps(part.name))
+        with joblib.parallel_config(backend="sequential"):
+            written = summaries.summarise_multiverse(sweeps_of(number, first), Size(seeds=1), tmp_path / folder)
+        return {path.name: path.read_bytes() for path in written}
+
+    monkeypatch.setattr(summaries, "_of_block", of_block)
+    return summarise
+
+
+def test_a_multiverse_is_made_longer_from_its_summary_alone(made_up, tmp_path):
+    whole = made_up("whole", 3 * PER_BLOCK)
+    made_up("parts", 2 * PER_BLOCK)
+    require_earlier(2 * PER_BLOCK, 1, tmp_path / "parts")
+    assert made_up("parts", PER_BLOCK, first=2 * PER_BLOCK) == whole
+    assert set(json.loads(whole["manifests.json"])) == {
+        f"multiverse/{block}{part}"
+        for block in ("000000-000063", "000064-000127", "000128-000191")
+        for part in ("", "-source")
+    }
+    # Readings that are run once more take the place of what they were.
+    assert made_up("parts", 2 * PER_BLOCK, first=PER_BLOCK) == whole
+
+
+def test_readings_before_the_first_must_be_there(made_up, tmp_path):
+    with pytest.raises(ValueError, match=r"first: 64; allowed: readings before it, seeds = 1, in .* which is missing"):
+        require_earlier(64, 1, tmp_path)
+    made_up("parts", PER_BLOCK)
+    with pytest.raises(ValueError, match=r"first: 128; .* where 64 and 63 others are missing"):
+        require_earlier(128, 1, tmp_path / "parts")
+    with pytest.raises(ValueError, match=r"first: 64; .* seeds = 2, .* where 0 and 63 others are missing"):
+        require_earlier(64, 2, tmp_path / "parts")
+
+
+@pytest.mark.parametrize(
+    ("flags", "message"),
+    [
+        (["multiverse", "--readings", "128", "--first", "63"], "first: 63; allowed: a multiple of 64"),
+        (["multiverse", "--readings", "128", "--first", "128"], "first: 128; allowed: a multiple of 64"),
+        (["multiverse", "--readings", "128", "--first", "64"], "first: 64; allowed: readings before it"),
+        (["fig6", "--first", "64"], "name: 'fig6'; allowed: multiverse, for which alone --first is"),
+    ],
+)
+def test_a_bad_first_reading_is_refused(flags, message, tmp_path, capsys):
+    assert main(["run", *flags, "--out", str(tmp_path)]) == 2
+    assert message in capsys.readouterr().err
+    assert not any(tmp_path.iterdir())
 
 
 def test_the_default_has_a_place_in_the_space():
