@@ -8,6 +8,7 @@ than it is, so it is confirmed with seeds that nothing was chosen by.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
@@ -21,7 +22,7 @@ from paper_figs.plots import style
 from paper_figs.studies import multiverse
 from sweeps.preset import preset_text
 from sweeps.results import store
-from sweeps.studies.multiverse import MULTIVERSE
+from sweeps.studies.multiverse import verdicts_file
 from sweeps.studies.readings import PER_BLOCK, READINGS, as_text, default_unit, is_static, range_of, unit_of, values_at
 from sweeps.studies.reconstruction import NAME, Effort, confirmation_sweep, generation_sweep, of_seeds
 from sweeps.sweep import Size, Sweep
@@ -56,9 +57,10 @@ def search(effort: Effort, size: Size, out: Path, run: Callable[..., Path]) -> l
     Args:
       effort: how much to search and to confirm.
       size: of the runs that are searched.
-      out: the folder of all results. If a multiverse is there, its readings are tried already, and the search starts
-        from the best of them.
-      run: runs a sweep; takes the size as a keyword if it is another one.
+      out: the folder of all results. If a multiverse's summary is there, its readings are tried already, and the search
+        starts from the best of them. What an earlier search tried or confirmed is not run again; its verdicts are kept
+        in OUT/reconstruction/summary.
+      run: runs a sweep; takes the size as a keyword.
 
     Returns:
       The files in OUT/reconstruction/summary.
@@ -68,20 +70,16 @@ def search(effort: Effort, size: Size, out: Path, run: Callable[..., Path]) -> l
     found: list[Tried] = []
     while len(found) < effort.readings:
         optimiser = optimisers[len(found) // effort.per_generation % len(optimisers)]
-        units = optimiser.ask()
-        sweep = generation_sweep(len(found), units)
-        run(sweep)
-        verdicts = _verdicts(sweep, size, out, first_seed=0)
-        generation = [
-            Tried(f"search {number}", unit, of) for unit, (number, of) in zip(units, verdicts.items(), strict=True)
-        ]
+        units, first = optimiser.ask(), len(found)
+        verdicts = _kept(generation_sweep(first, units), size, out, run)
+        generation = [Tried(f"search {first + i}", *each) for i, each in enumerate(zip(units, verdicts, strict=True))]
         optimiser.tell([one.agreement for one in generation])
         found += generation
-    chosen = choice_of(known + found)
-    sweep, fresh = confirmation_sweep([one.unit for one, _ in chosen]), of_seeds(size, size.seeds + effort.confirm)
-    run(sweep, size=fresh)
-    confirmed = _verdicts(sweep, fresh, out, first_seed=size.seeds)
-    return _write(out / NAME / "summary", known + found, chosen, list(confirmed.values()))
+    chosen, fresh = choice_of(known + found), of_seeds(size, size.seeds + effort.confirm)
+    confirmed = []
+    for one, _ in chosen:
+        confirmed += _kept(confirmation_sweep(one.unit), fresh, out, run, first_seed=size.seeds)
+    return _write(out / NAME / "summary", known + found, chosen, confirmed)
 
 
 class _Optimiser:
@@ -117,7 +115,7 @@ class _Optimiser:
 
 def _of_multiverse(out: Path) -> list[Tried]:
     """The readings of a multiverse, if there is one."""
-    path = out / MULTIVERSE.name / "summary" / "verdicts.csv"
+    path = verdicts_file(out)
     if not path.is_file():
         return []
     readings = pd.read_csv(path, keep_default_na=True).groupby("reading")
@@ -149,14 +147,23 @@ def choice_of(tried: list[Tried]) -> list[tuple[Tried, list[str]]]:
     return [(tried[place], what) for place, what in chosen.items()]
 
 
-def _verdicts(sweep: Sweep, size: Size, out: Path, first_seed: int) -> dict[int, pd.DataFrame]:
-    """The verdicts in each reading of a block, from the seeds after the first ones."""
+def _kept(sweep: Sweep, size: Size, out: Path, run: Callable[..., Path], first_seed: int = 0) -> list[pd.DataFrame]:
+    """The verdicts in each reading of a block, from the seeds after the first ones; run unless they are kept."""
+    key = hashlib.sha256(repr((sweep, size, first_seed)).encode()).hexdigest()[:8]
+    path = out / NAME / "summary" / f"{sweep.name.removeprefix(NAME + '/')}-{key}.csv"
+    if not path.is_file():
+        run(sweep, size=size)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        style.save_table(_verdicts(sweep, size, out, first_seed), path)
+    return [of for _, of in pd.read_csv(path).groupby("reading")]
+
+
+def _verdicts(sweep: Sweep, size: Size, out: Path, first_seed: int) -> pd.DataFrame:
     assert sweep.source
     data = [
         store.load(out / part.name, size.seeds).isel(seed=slice(first_seed, None)) for part in (sweep.source, sweep)
     ]
-    judged = multiverse.of_readings(*data)
-    return {number: multiverse.verdicts([(number, of)]) for number, of in judged}
+    return multiverse.verdicts(list(multiverse.of_readings(*data)))
 
 
 def _write(folder: Path, tried: list[Tried], chosen: list, confirmed: list[pd.DataFrame]) -> list[Path]:

@@ -5,6 +5,7 @@ What judges readings lies in a layer above, see `paper_figs.studies.reconstructi
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -63,9 +64,10 @@ def generation_sweep(first: int, units: Sequence[np.ndarray]) -> Sweep:
     return block_sweep(f"{NAME}/tried", numbers, [values_at(unit) for unit in units])
 
 
-def confirmation_sweep(units: Sequence[np.ndarray]) -> Sweep:
-    """The readings that are confirmed, as one block."""
-    return block_sweep(f"{NAME}/confirmed", range(len(units)), [values_at(unit) for unit in units])
+def confirmation_sweep(unit: np.ndarray) -> Sweep:
+    """A reading that is confirmed, named by what it is."""
+    values = values_at(unit)
+    return block_sweep(f"{NAME}/confirmed/{hashlib.sha256(repr(values).encode()).hexdigest()[:8]}", [0], [values])
 
 
 RECONSTRUCTION = Study(

@@ -41,19 +41,19 @@ def small_steps_only(monkeypatch):
     def remember(make):
         def kept(*args):
             sweep = make(*args)
-            units[sweep.name] = args[-1]
+            units[sweep.name] = args[-1] if isinstance(args[-1], list) else [args[-1]]
             return sweep
 
         return kept
 
     def verdicts(sweep, size, out, first_seed):
         seen.append((sweep.name, size.seeds, first_seed))
-        found = {}
-        for number, unit in enumerate(units[sweep.name]):
+        numbers, found = sweep.source.design.values("reading"), []
+        for number, unit in zip(numbers, units[sweep.name], strict=True):
             holds = np.arange(len(CLAIMS)) >= len(CLAIMS) * unit[RATE]
             holds[:2] &= first_seed == 0
-            found[number] = verdicts_of(holds)
-        return found
+            found.append(verdicts_of(holds).assign(reading=int(number)))
+        return pd.concat(found)
 
     for name in ("generation_sweep", "confirmation_sweep"):
         monkeypatch.setattr(reconstruction, name, remember(getattr(reconstruction, name)))
@@ -70,7 +70,8 @@ def test_the_search_finds_the_reading_and_confirms_it_with_other_seeds(small_ste
     assert len(tried) == 160
     rates = tried["hparams.learning_rate"].to_numpy()
     assert np.median(rates[-16:]) < 1e-5 < 1e-4 < np.median(rates[:16])
-    assert ran == [2] * 10 + [9]  # 7 fresh seeds beyond the 2 of the search
+    chosen = pd.read_csv(summary / "confirmed.csv").reading.nunique()
+    assert ran == [2] * 10 + [9] * chosen  # 7 fresh seeds beyond the 2 of the search
     assert small_steps_only[-1][1:] == (9, 2)
     confirmed = pd.read_csv(summary / "confirmed.csv")
     best = confirmed[confirmed.best_for.str.contains("all")]
@@ -88,6 +89,28 @@ def test_a_search_is_the_same_each_time(small_steps_only, tmp_path):
         reconstruction.search(effort, SIZE, tmp_path / name, lambda sweep, size=SIZE: None)
         tables.append((tmp_path / name / "reconstruction" / "summary" / "tried.csv").read_bytes())
     assert tables[0] == tables[1]
+
+
+def test_a_search_goes_on_from_the_verdicts_that_it_kept(small_steps_only, tmp_path):
+    def search(readings, seeds=2):
+        ran = []
+        effort, size = Effort(readings=readings, confirm=1, starts=2, per_generation=4), Size(seeds=seeds, episodes=5)
+        reconstruction.search(effort, size, tmp_path, lambda sweep, size=SIZE: ran.append(sweep.name))
+        return ran
+
+    summary = tmp_path / "reconstruction" / "summary"
+    tried, confirmed = search(8), {path.name for path in (summary / "confirmed").glob("*/*.csv")}
+    assert tried[:2] == ["reconstruction/tried/000000-000003", "reconstruction/tried/000004-000007"]
+    assert len(tried) == 2 + len(confirmed) > 2
+    before = (summary / "tried.csv").read_bytes()
+    assert search(8) == []
+    assert (summary / "tried.csv").read_bytes() == before
+    assert search(12)[0] == "reconstruction/tried/000008-000011"
+    assert (summary / "tried.csv").read_bytes().startswith(before)
+    # Verdicts of other readings or of another size are no one's.
+    assert [name for name in search(12, seeds=3) if "tried" in name] == [
+        f"reconstruction/tried/{block}" for block in ("000000-000003", "000004-000007", "000008-000011")
+    ]
 
 
 def test_what_decides_code_stays_as_it_is_at_the_start():
