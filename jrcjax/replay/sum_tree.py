@@ -1,16 +1,18 @@
 """A sum tree: values that are drawn in proportion to their size, and replaced, in logarithmic time.
 
 All nodes lie in one array. A row holds the values of one node's children, so that one look-up fetches all of them and
-touches one cache line. The rows of one level follow each other, the parents of the leaves first. With 10 leaves a to j
-and 2 children per node, if the top level had at most 3 rows:
+touches one cache line. The rows of one level follow each other, the parents of the leaves first. With 10 leaves a to j,
+2 children per node, and levels of at most 3 rows not stored:
 
     row            level                     holds
     0 1 2 3 4      0, parents of leaves      a b | c d | e f | g h | i j
-    5 6 7          1, the top                0 1 | 2 3 | 4 .       sums of rows 0 to 4; the last column is empty
+    (0 1 2)        1, the top                0 1 | 2 3 | 4 .       sums of rows 0 to 4; the last column is empty
 
-Leaf i lies in row i // 2, column i % 2; the sum of that row lies in row 5 + (i // 2) // 2, column (i // 2) % 2. The
-tree ends where a level has few rows, which are searched all at once. Nodes are always recomputed from their children
-and never adjusted by differences: rounding can't pile up, however many updates there are.
+Leaf i lies in row i // 2, column i % 2; the sum of that row lies in row (i // 2) // 2 of the level above, column
+(i // 2) % 2. Levels of few rows are added up anew from the level below for every draw, all of their sums at once, which
+costs less than to keep them. The tree ends where a level has very few rows, which are searched all at once. Nodes are
+always recomputed from their children and never adjusted by differences: rounding can't pile up, however many updates
+there are.
 """
 
 from __future__ import annotations
@@ -19,12 +21,14 @@ import functools
 import operator
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 
 from jrcjax import rng
 from jrcjax.types import Float, Int, Words
 
 _TOP_ROWS = 16  # rows of the top level, at most
+_STORED_ROWS = 256  # a level above one of so many rows or fewer is not stored
 NUM_WORDS = 2
 """Random words of one draw."""
 
@@ -35,10 +39,15 @@ class Layout(NamedTuple):
     leaves: int
     children: int
     """Children per node, a power of two: the length of a row."""
+    levels: tuple[int, ...]
+    """Rows of each level, the top last."""
     first_row: tuple[int, ...]
-    """Where each level begins."""
-    rows: int
-    """Rows of all levels."""
+    """Where each level that is stored begins."""
+
+    @property
+    def rows(self) -> int:
+        """Rows that are stored."""
+        return sum(self.levels[: len(self.first_row)])
 
     def parent(self, index: Int) -> Int:
         """The row, counted from its level's first one, in which child number `index` lies."""
@@ -51,22 +60,30 @@ class Layout(NamedTuple):
 
 def layout_of(leaves: int, children: int = 4) -> Layout:
     """The tree over so many leaves; of 4, 8, 16 and 32 children 4 are the fastest for 50,000 leaves and 64 draws."""
-    first_row, rows, size = [], 0, leaves
-    while not first_row or size > _TOP_ROWS:
+    levels, size = [], leaves
+    while not levels or size > _TOP_ROWS:
         size = -(-size // children)
-        first_row.append(rows)
-        rows += size
-    return Layout(leaves, children, tuple(first_row), rows)
+        levels.append(size)
+    stored = 1 + sum(size > _STORED_ROWS for size in levels[:-1])
+    first_row = tuple(sum(levels[:level]) for level in range(stored))
+    return Layout(leaves, children, tuple(levels), first_row)
 
 
 def init(values: Float, layout: Layout) -> Float:
     """The tree with these leaves, [leaves] values >= 0, as [rows, children]."""
-    levels = []
-    for _ in layout.first_row:
-        rows = jnp.pad(values, (0, -values.shape[0] % layout.children)).reshape(-1, layout.children)
-        levels.append(rows)
-        values = rows.sum(axis=-1)
+    levels = [_as_rows(values, layout)]
+    for _ in layout.first_row[1:]:
+        levels.append(_above(levels[-1], layout))
     return jnp.concatenate(levels)
+
+
+def _as_rows(values: Float, layout: Layout) -> Float:
+    return jnp.pad(values, (0, -values.shape[0] % layout.children)).reshape(-1, layout.children)
+
+
+def _above(rows: Float, layout: Layout) -> Float:
+    """The level above one with these rows."""
+    return _as_rows(_sum(rows), layout)
 
 
 def leaves(tree: Float, indices: Int, layout: Layout) -> Float:
@@ -76,11 +93,16 @@ def leaves(tree: Float, indices: Int, layout: Layout) -> Float:
 
 def total(tree: Float, layout: Layout) -> Float:
     """Sum of all leaves."""
-    return _top(tree, layout).sum()
+    # Behind a barrier, since a sum that XLA joins with those of the levels below rounds differently.
+    return jax.lax.optimization_barrier(_upper(tree, layout)[-1]).sum()
 
 
-def _top(tree: Float, layout: Layout) -> Float:
-    return tree[layout.first_row[-1] :]
+def _upper(tree: Float, layout: Layout) -> list[Float]:
+    """The highest level that is stored, and all above it, up to the top."""
+    levels = [tree[layout.first_row[-1] :]]
+    for _ in layout.levels[len(layout.first_row) :]:
+        levels.append(_above(levels[-1], layout))
+    return levels
 
 
 def _sum(rows: Float) -> Float:
@@ -131,14 +153,14 @@ def sample(tree: Float, words: Words, layout: Layout) -> tuple[Int, Float]:
     Returns:
       Indices of the leaves and their values, [B] each.
     """
-    *lower, _ = layout.first_row
-    top = _top(tree, layout)
+    *upper, top = _upper(tree, layout)
     node = _node_at(top, rng.uniform(words[0]))
     value = top.reshape(-1)[node]
     # Two words, since the 24 bits of one uniform number are too coarse for 50,000 leaves.
     rest = rng.uniform(words[1]) * value
-    for first_row in reversed(lower):
-        child, value, rest = _child_at(tree.at[first_row + node].get(mode="promise_in_bounds"), rest)
+    levels = [(level, 0) for level in upper[::-1]] + [(tree, first_row) for first_row in layout.first_row[-2::-1]]
+    for rows, first_row in levels:
+        child, value, rest = _child_at(rows.at[first_row + node].get(mode="promise_in_bounds"), rest)
         node = node * layout.children + child
     return node, value
 
@@ -157,8 +179,10 @@ def _node_at(rows: Float, share: Float) -> Int:
 
 def _child_at(children: Float, rest: Float) -> tuple[Int, Float, Float]:
     """Which of children [B, N] lies at `rest` [B] of their running sum; its value; how far into it."""
-    values = [children[:, k] for k in range(children.shape[1])]
-    child = jnp.zeros(rest.shape, jnp.int32)
+    # In one array of three rows, one for each result, which XLA computes in one loop; of three arrays it makes seven.
+    shape = (3, *rest.shape)
+    values = [jnp.broadcast_to(children[:, k], shape) for k in range(children.shape[1])]
+    rest, child = jnp.broadcast_to(rest, shape), jnp.zeros(shape, jnp.float32)
     while len(values) > 1:
         half = len(values) // 2
         left, right = values[:half], values[half:]
@@ -167,4 +191,6 @@ def _child_at(children: Float, rest: Float) -> tuple[Int, Float, Float]:
         child = jnp.where(beyond, child + half, child)
         rest = jnp.where(beyond, rest - sum_left, rest)
         values = [jnp.where(beyond, *pair) for pair in zip(right, left, strict=True)]
-    return child, values[0], rest
+    result = jax.lax.broadcasted_iota(jnp.int32, shape, 0)
+    child, value, rest = jnp.where(result == 0, child, jnp.where(result == 1, values[0], rest))
+    return child.astype(jnp.int32), value, rest

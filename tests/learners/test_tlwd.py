@@ -292,7 +292,7 @@ class Algorithm2(Descent):
 
     def draw(self, group_word, word) -> int:
         """A transition below one node of the tree's top, by its share of the priorities (23): first the node."""
-        levels = len(sum_tree.layout_of(self.config.replay_capacity).first_row)
+        levels = len(sum_tree.layout_of(self.config.replay_capacity).levels)
         size = 4 ** (levels - 1)
         groups = [self.priorities[i : i + size] for i in range(0, len(self.priorities), size)]
         group = search([np.sum(each) for each in groups], uniform(group_word))

@@ -30,18 +30,22 @@ def f32(values) -> jax.Array:
 
 
 def assert_stands_for(tree, layout, leaves: np.ndarray, rtol: float) -> None:
-    """The tree has these leaves, and every node is the sum of its children, up to the few nodes of the top."""
+    """The tree has these leaves, and every node is the sum of its children, in all levels that are stored."""
     assert tree.shape == (layout.rows, RADIX)
     assert layout.first_row[0] == 0
     rows, children = np.asarray(tree, np.float64), leaves.astype(np.float32).astype(np.float64)
     np.testing.assert_array_equal(rows.ravel()[: layout.leaves], children)
+    sizes = np.diff([*layout.first_row, layout.rows])
+    assert sizes.tolist() == list(layout.levels[: len(sizes)])
+    assert all(size > 256 for size in sizes[:-1])  # what is above few rows is not stored
+    assert sizes[-1] <= 256 or len(sizes) == len(layout.levels)
     for first, end in zip(layout.first_row, [*layout.first_row[1:], layout.rows], strict=True):
         stored = rows[first:end].ravel()
         np.testing.assert_allclose(stored[: len(children)], children, rtol=rtol)
         assert not stored[len(children) :].any()  # what fills the last row
         assert end - first == -(-len(children) // RADIX)
         children = rows[first:end].sum(axis=1)
-    assert len(children) <= 16
+    assert layout.levels[-1] <= 16
 
 
 @partial(jax.jit, static_argnums=0)
@@ -77,7 +81,7 @@ def drive(leaves: int, rng: np.random.Generator, values, rtol: float, rounds: in
         np.testing.assert_array_equal(got, f32(twin))
         assert_stands_for(tree, layout, twin, rtol)
         # Over the levels below the top, and the top's at most 16 rows.
-        np.testing.assert_allclose(float(total), twin.sum(), rtol=(len(layout.first_row) + 16) * rtol)
+        np.testing.assert_allclose(float(total), twin.sum(), rtol=(len(layout.levels) + 16) * rtol)
 
     check(start)
     for k in range(rounds):
@@ -173,7 +177,7 @@ def test_leaves_of_the_papers_memory_are_drawn_in_proportion_to_their_values():
         bins = lambda x: x[order].reshape(500, 100).sum(axis=1)  # noqa: B023, E731
         assert chi_square(bins(counts), bins(values / values.sum())) > ALPHA
     # Within neighbourhoods, since one word chooses those and another the leaf: position among 1024.
-    position = np.arange(layout.leaves) % RADIX ** (len(layout.first_row) - 1)
+    position = np.arange(layout.leaves) % RADIX ** (len(layout.levels) - 1)
     assert chi_square(np.bincount(position, counts), np.bincount(position, values / values.sum())) > ALPHA
 
 
