@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
+from paper_figs.analysis.intervals import proportion_effect
 from paper_figs.markdown import listed, percent, table
+from paper_figs.studies import multiverse
+from sweeps.design import in_range
 from sweeps.studies.multiverse import MULTIVERSE
 from sweeps.studies.readings import READINGS, Reading, as_text, choices, default_unit, range_of, values_at
 from sweeps.studies.reconstruction import NAME as RECONSTRUCTION
@@ -27,9 +32,20 @@ def _share(row: Mapping[Hashable, Any], name: str) -> str:
     return f"{percent(row[name])} ({100 * row[f'{name}_low']:.3g} to {100 * row[f'{name}_high']:.3g})"
 
 
+def _share_of(holds: pd.Series) -> str:
+    """The share of readings in which a statement holds."""
+    of = proportion_effect(int(holds.sum()), len(holds))
+    return _share({"holds": float(of.value), "holds_low": float(of.low), "holds_high": float(of.high)}, "holds")
+
+
+def _strongest(sensitivity: pd.DataFrame, claim: str, most: int) -> pd.DataFrame:
+    """The questions that decide a statement, the strongest first."""
+    return sensitivity.query("claim == @claim and total_low > @_DECIDING").nlargest(most, "total")
+
+
 def _deciding(sensitivity: pd.DataFrame, claim: str, most: int = 3) -> str:
     """The questions that decide a statement, with their total-order indices."""
-    of_claim = sensitivity.query("claim == @claim and total_low > @_DECIDING").nlargest(most, "total")
+    of_claim = _strongest(sensitivity, claim, most)
     return ", ".join(f"{row['input']} {row['total']:.2f}" for _, row in of_claim.iterrows()) or "no single question"
 
 
@@ -68,6 +84,29 @@ def decided_table(published: Path) -> str:
         for row in claims.to_dict("records")
     ]
     return table(("statement", "holds in (95 % interval)", "decided by (total-order index)", "error"), rows)
+
+
+def answers_table(published: Path) -> str:
+    """Where the statements of the first page hold, by the answers to the two questions that decide each most."""
+    verdicts, sensitivity = (_csv(published, MULTIVERSE.name, name) for name in ("verdicts", "sensitivity"))
+    places, by_label = multiverse.places(int(verdicts.reading.max()) + 1), {r.label: r for r in READINGS}
+    rows = []
+    for claim in NAMED:
+        holds = verdicts.query("claim == @claim and reading > 0").set_index("reading").holds.astype(bool)
+        for label in _strongest(sensitivity, claim, 2)["input"]:
+            names, which = _answers(by_label[label], places[label].loc[holds.index].to_numpy())
+            cells = [f"{name}: {_share_of(holds[which == i])}" for i, name in enumerate(names)]
+            rows.append((claim, label, "; ".join(cells)))
+    return table(("statement", "question", "holds in (95 % interval), by answer"), rows)
+
+
+def _answers(reading: Reading, places: np.ndarray) -> tuple[list[str], np.ndarray]:
+    """Names of a question's answers, or of the thirds of its range, and which of them each reading has."""
+    where = range_of(reading)
+    if where.levels:
+        return [str(as_text(reading.path, level)) for level in where.levels], places.astype(int)
+    ends = in_range(np.arange(4) / 3, False, where)
+    return [f"{low:.2g} to {high:.2g}" for low, high in pairwise(ends)], np.minimum(3 * places, 2).astype(int)
 
 
 def _searched(reading: Reading) -> str:
@@ -126,6 +165,7 @@ BLOCKS: dict[str, Callable[[Path], str]] = {
     "readings": readings_list,
     "decided": decided_table,
     "questions": questions_table,
+    "answers": answers_table,
     "reconstruction": reconstruction_list,
 }
 """Name of a marked part to what makes it from the folder of published results."""

@@ -96,11 +96,11 @@ def specification(found: pd.DataFrame, sensitivity: pd.DataFrame) -> Figure:
     most = sensitivity.sort_values("total", ascending=False)
     decisive = {claim: most.input[most.claim == claim].tolist() for claim in HEADLINES}
     limits = {c.claim: float(c.limit) for c in CLAIMS if decisive.get(c.claim) and isinstance(c.limit, float)}
-    places = _inputs(int(found.reading.max()) + 1)
-    return plot.draw_specification(found.query("reading > 0"), places / places.max(), decisive, limits)
+    inputs = places(int(found.reading.max()) + 1)
+    return plot.draw_specification(found.query("reading > 0"), inputs / inputs.max(), decisive, limits)
 
 
-def _inputs(number: int) -> pd.DataFrame:
+def places(number: int) -> pd.DataFrame:
     """Places of readings in their ranges, a column per question; levels as whole numbers."""
     unit = unit_of(number)
     for column, reading in enumerate(READINGS):
@@ -113,7 +113,7 @@ def decisive(found: pd.DataFrame) -> dict[str, pd.DataFrame]:
     """Sensitivity indices of each claim's effect over the readings, and interactions of its three strongest ones."""
     sampled = found.query("reading > 0")  # reading 0 is the default and no point of the sample
     sampled = sampled[np.isfinite(sampled.value.to_numpy(float))]
-    inputs = _inputs(int(found.reading.max()) + 1)
+    inputs = places(int(found.reading.max()) + 1)
     enough = [(c, of_claim) for c, of_claim in sampled.groupby("claim", sort=False) if len(of_claim) >= LEAST_POINTS]
     tables = on_cores(_decisive, ((str(claim), of_claim, inputs) for claim, of_claim in enough))
     return {name: pd.concat(t[name] for t in tables) for name in ("sensitivity", "interactions")} if enough else {}

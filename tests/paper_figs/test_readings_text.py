@@ -4,6 +4,7 @@ import pandas as pd
 import pytest
 
 from paper_figs import publish, readings_text, readme
+from paper_figs.studies import multiverse
 from sweeps.studies.readings import READINGS
 
 STEP, MARGIN = READINGS[0].label, "margin"
@@ -38,7 +39,10 @@ def published(tmp_path):
         }
         for claim, holds, verdict in (("C3 (TLwD)", True, "supported"), ("C4", False, "contradicted"))
     ]
+    steps = multiverse.places(41)[STEP]
+    verdicts = [{"reading": n, "claim": "C3 (TLwD)", "holds": bool(steps[n] < 1 / 3)} for n in range(41)]
     tables = {
+        "multiverse/verdicts": verdicts,
         "multiverse/claims": claims,
         "multiverse/sensitivity": sensitivity,
         "reconstruction/tried": tried,
@@ -75,6 +79,16 @@ def test_every_statement_has_what_decides_it(published):
     rows = readings_text.decided_table(published).splitlines()[2:]
     assert len(rows) == len(readings_text.NAMED) + 2
     assert f"| C3 (TLwD) | 50 % (45 to 55) | {STEP} 0.80 | 0.25 |" in rows
+
+
+def test_a_statement_holds_by_the_answers_that_decide_it(published):
+    # In the fixture's world C3 holds where the step size lies in the lowest third of its range.
+    rows = readings_text.answers_table(published).splitlines()[2:]
+    (row,) = [row for row in rows if "C3 (TLwD)" in row]
+    assert STEP in row
+    assert "1e-06 to 2.2e-05: 100 % (" in row
+    assert "2.2e-05 to 0.00046: 0 % (0 to " in row
+    assert "0.00046 to 0.01: 0 % (0 to " in row
 
 
 def test_promise_and_confirmation_stand_side_by_side(published):
