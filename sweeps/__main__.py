@@ -58,8 +58,10 @@ class Run:
     """Of the multiverse and of the reconstruction, how many readings of the paper. Default: 512 and 336, or 2 and 4
     with --smoke."""
     first: int = 0
-    """Of the multiverse, the first reading to run, a multiple of 64; those before it are taken from its summary in
-    OUT/multiverse/summary, which an earlier run wrote."""
+    """Of the multiverse, the first reading to run, a multiple of 64."""
+    keep: bool = False
+    """Of the multiverse, keep what the summary in OUT/multiverse/summary, which an earlier run wrote, says of other
+    readings."""
     confirm: Count = None
     """Of the reconstruction, how many fresh seeds confirm what it found. Default: 100, or 1 with --smoke."""
     custom: tyro.conf.OmitArgPrefixes[Options] = field(default_factory=Options)
@@ -117,8 +119,8 @@ def _run(command: Command) -> int:
     study = _study(command, preset)
     size = size_of(command.seeds, command.episodes, preset, command.smoke, study)
     size.check()
-    if command.first:
-        multiverse.require_earlier(command.first, size.seeds, command.out)
+    if command.keep:
+        multiverse.require_summary(command.out)
     sweeps = study.smoke_sweeps if command.smoke and study.smoke_sweeps else study.sweeps
     require_integer("wait", command.wait, 0)
     options = {"resume": command.resume, "save_agents": command.save_agents, "patience": command.wait}
@@ -130,7 +132,8 @@ def _run(command: Command) -> int:
         else:
             written = [run(sweep) for sweep in sweeps]
         if study.summary:
-            written += _found(study.summary)(sweeps, size, command.out)
+            also = {"keep": True} if command.keep else {}
+            written += _found(study.summary)(sweeps, size, command.out, **also)
     print("\n".join(map(str, written)))
     return 0
 
@@ -147,7 +150,8 @@ def _study(command: Run, preset: str) -> Study:
     from sweeps.studies.registry import EVERY_SWEEP, STUDIES
 
     of_readings = (multiverse.MULTIVERSE.name, reconstruction.NAME)
-    for option, names in {"readings": of_readings, "first": of_readings[:1], "confirm": of_readings[1:]}.items():
+    limited = {"readings": of_readings, "confirm": of_readings[1:]} | dict.fromkeys(("first", "keep"), of_readings[:1])
+    for option, names in limited.items():
         if getattr(command, option) != getattr(Run, option) and command.name not in names:
             refuse("name", command.name, f"{' or '.join(names)}, for which alone --{option} is")
     if command.name == CUSTOM:

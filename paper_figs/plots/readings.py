@@ -16,7 +16,7 @@ _DECIDING = 5  # readings whose choices stand under a specification curve
 
 @style.styled
 def draw_shares(claims: pd.DataFrame) -> Figure:
-    """The share of readings in which each statement holds by its estimate, is supported, and is contradicted.
+    """The share of readings in which each statement holds by its estimate; of those with verdicts, the share of each.
 
     Args:
       claims: a row per statement, as `paper_figs.studies.multiverse.shares` gives them.
@@ -30,9 +30,9 @@ def draw_shares(claims: pd.DataFrame) -> Figure:
         ("negligible", _BLUE, "s", -0.22),
     ):
         value = claims[name].to_numpy()
-        bars = np.clip([value - claims[f"{name}_low"], claims[f"{name}_high"] - value], 0.0, None)
-        if name == "negligible" and not value.any():
+        if name != "holds" and not (value > 0).any():
             continue
+        bars = np.clip([value - claims[f"{name}_low"], claims[f"{name}_high"] - value], 0.0, None)
         look = {"markersize": 2.5, "elinewidth": 0.6, "linestyle": ""}
         axes.errorbar(100 * value, rows + shift, xerr=100 * bars, marker=marker, color=colour, label=name, **look)
     axes.set_yticks(rows, claims.claim, fontsize=5)
@@ -40,7 +40,9 @@ def draw_shares(claims: pd.DataFrame) -> Figure:
     axes.set_xlim(-2, 102)
     axes.grid(axis="y", linewidth=0.2)
     axes.set_xlabel("share of readings (%)")
-    figure.suptitle(f"Where the claims hold: {int(claims.readings.max())} readings (bars: 95 % intervals)")
+    judged = int(claims.judged.max())
+    of_verdicts = f", verdicts of {judged} of them" if judged else ""
+    figure.suptitle(f"Where the claims hold: {int(claims.readings.max())} readings{of_verdicts} (bars: 95 % intervals)")
     figure.legend(loc="outside lower center", ncols=4)
     return figure
 

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from paper_figs.analysis.intervals import proportion_effect
 from paper_figs.analysis.sensitivity import LEAST_POINTS, sensitivity
 from paper_figs.claims.judge import Judgement, is_on_its_side
+from paper_figs.claims.results import Rules
 from paper_figs.claims.table import CLAIMS, claims_of, number_of
 from paper_figs.cores import on_cores
 from paper_figs.plots import readings as plot
@@ -69,15 +70,20 @@ def agreement(of_reading: pd.DataFrame) -> pd.Series:
 
 
 def shares(found: pd.DataFrame) -> pd.DataFrame:
-    """One row per claim: the share of readings with each verdict, and of those where it holds, with 95 % limits."""
+    """One row per claim: the share of readings where it holds; of those with seeds enough, that of each verdict.
+
+    The limits are of 95 %; `readings` and `judged` count what the shares are of.
+    """
     rows = []
     for claim, of_claim in found.groupby("claim", sort=False):
-        row: dict[str, object] = {"claim": claim, "readings": len(of_claim)}
-        counts = {verdict: (of_claim.verdict == verdict).sum() for verdict in VERDICTS}
-        counts |= {"negligible": (of_claim.negligible == True).sum(), "holds": of_claim.holds.astype(bool).sum()}  # noqa: E712
-        for name, count in counts.items():
-            share = proportion_effect(int(count), len(of_claim))
-            row |= {name: float(share.value), f"{name}_low": float(share.low), f"{name}_high": float(share.high)}
+        judged = of_claim[of_claim.n_seeds >= Rules().least_seeds]
+        row: dict[str, object] = {"claim": claim, "readings": len(of_claim), "judged": len(judged)}
+        counts = {"holds": (of_claim.holds.astype(bool).sum(), len(of_claim))}
+        counts |= {verdict: ((judged.verdict == verdict).sum(), len(judged)) for verdict in VERDICTS}
+        counts["negligible"] = (judged.negligible == True).sum(), len(judged)  # noqa: E712
+        for name, (count, number) in counts.items():
+            share = proportion_effect(int(count), number) if number else (np.nan,) * 3
+            row |= dict(zip((name, f"{name}_low", f"{name}_high"), map(float, share), strict=True))
         rows.append(row)
     return pd.DataFrame(rows)
 

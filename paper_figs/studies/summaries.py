@@ -22,16 +22,14 @@ def _write(folder: Path, tables: dict[str, pd.DataFrame]) -> list[Path]:
     return [style.save_table(table, folder / f"{name}.csv") for name, table in tables.items()]
 
 
-def _manifests(folder: Path, sweeps: tuple[Sweep, ...], out: Path, earlier: bool = False) -> Path:
-    """What reproduces the summary: the manifests of all results that it rests on, and of earlier ones if it does."""
+def _manifests(folder: Path, sweeps: tuple[Sweep, ...], out: Path, keep: bool = False) -> Path:
+    """What reproduces the summary: the manifests of all results that it rests on; those that it has may be kept."""
     path = folder / "manifests.json"
     all_sweeps = [part for sweep in sweeps for part in (sweep, sweep.source) if part]
-    found = {
-        sweep.name: json.loads((out / sweep.name / store.MANIFEST).read_text(encoding="utf-8")) for sweep in all_sweeps
-    }
-    if earlier:
-        found = json.loads(path.read_text(encoding="utf-8")) | found
-    return write_text(path, json.dumps(found, indent=1) + "\n")
+    found = json.loads(path.read_text(encoding="utf-8")) if keep else {}
+    for sweep in all_sweeps:
+        found[sweep.name] = json.loads((out / sweep.name / store.MANIFEST).read_text(encoding="utf-8"))
+    return write_text(path, json.dumps(found, indent=1, sort_keys=True) + "\n")
 
 
 def summarise_robustness(sweeps: tuple[Sweep, ...], size: Size, out: Path) -> list[Path]:
@@ -44,15 +42,22 @@ def summarise_robustness(sweeps: tuple[Sweep, ...], size: Size, out: Path) -> li
     return [*_write(folder, tables), *pictures, _manifests(folder, sweeps, out)]
 
 
-def summarise_multiverse(sweeps: tuple[Sweep, ...], size: Size, out: Path) -> list[Path]:
-    """Tables and figures of a multiverse, in OUT/multiverse/summary; readings before these sweeps stay as they are."""
+def summarise_multiverse(sweeps: tuple[Sweep, ...], size: Size, out: Path, keep: bool = False) -> list[Path]:
+    """Tables and figures of a multiverse, in OUT/multiverse/summary.
+
+    Args:
+      sweeps: the blocks of readings that were run.
+      size: of the runs.
+      out: the folder of all results.
+      keep: whether what the summary says of other readings is kept.
+    """
     path = verdicts_file(out)
     folder = path.parent
     folder.mkdir(parents=True, exist_ok=True)
     found = pd.concat(on_cores(_of_block, ((sweep, size, out) for sweep in sweeps)))
-    first = int(found.reading.min())
-    if first:
-        found = pd.concat([pd.read_csv(path).query("reading < @first"), found])
+    if keep:
+        known = pd.read_csv(path)
+        found = pd.concat([known[~known.reading.isin(found.reading)], found]).sort_values("reading", kind="stable")
     style.save_table(found, path)
     found = pd.read_csv(path)  # so that conclusions are the same whether readings came from this run or an earlier one
     tables = {
@@ -64,7 +69,7 @@ def summarise_multiverse(sweeps: tuple[Sweep, ...], size: Size, out: Path) -> li
     if "sensitivity" in tables:
         pictures += style.save(readings.draw_decisive(tables["sensitivity"]), folder / "sensitivity")
         pictures += style.save(multiverse.specification(found, tables["sensitivity"]), folder / "specification")
-    return [path, *_write(folder, tables), *pictures, _manifests(folder, sweeps, out, earlier=first > 0)]
+    return [path, *_write(folder, tables), *pictures, _manifests(folder, sweeps, out, keep)]
 
 
 def _of_block(sweep: Sweep, size: Size, out: Path) -> pd.DataFrame:

@@ -6,7 +6,6 @@ added, resumed, or sent to other machines.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -137,7 +136,7 @@ MULTIVERSE = Study(
 
 
 def study_of(number: int | None, smoke: bool, first: int = 0) -> Study:
-    """The study with so many readings, of which those before `first` are run already.
+    """The study of the readings from `first` on, up to so many in all.
 
     Raises:
       ValueError: naming the argument, the value and what is allowed.
@@ -155,14 +154,7 @@ def verdicts_file(out: Path) -> Path:
     return out / MULTIVERSE.name / "summary" / "verdicts.csv"
 
 
-def require_earlier(first: int, seeds: int, out: Path) -> None:
-    """Raises ValueError naming `first` unless the summary in `out` holds all readings before it, with these seeds."""
-    path = verdicts_file(out)
-    wanted = f"readings before it, seeds = {seeds}, in {path}"
-    if not path.is_file():
-        refuse("first", first, f"{wanted}, which is missing")
-    with path.open(encoding="utf-8", newline="") as file:
-        known = {int(row["reading"]) for row in csv.DictReader(file) if int(row["n_seeds"]) == seeds}
-    missing = sorted(set(range(first)) - known)
-    if missing:
-        refuse("first", first, f"{wanted}, where {missing[0]} and {len(missing) - 1} others are missing")
+def require_summary(out: Path) -> None:
+    """Raises ValueError naming `keep` unless there is a summary in `out`."""
+    if not verdicts_file(out).is_file():
+        refuse("keep", True, f"where an earlier run left its summary, and {verdicts_file(out)} is missing")

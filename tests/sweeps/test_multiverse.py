@@ -1,5 +1,6 @@
 """The multiverse: readings are what they are whatever their number, and a tiny run judges all claims."""
 
+import io
 import json
 
 import jax
@@ -15,7 +16,7 @@ from sweeps.__main__ import main
 from sweeps.engine.job import Job
 from sweeps.preset import base_of
 from sweeps.results import store
-from sweeps.studies.multiverse import POINTS, SMOKE, require_earlier, sweeps_of
+from sweeps.studies.multiverse import POINTS, SMOKE, sweeps_of
 from sweeps.studies.readings import (
     PER_BLOCK,
     READINGS,
@@ -117,46 +118,47 @@ def made_up(monkeypatch, tmp_path):
             {"reading": n, "claim": claim, "value": r.normal() + n / 100, "ci_low": -1.0, "ci_high": np.nan}
             | {"verdict": "undecided", "holds": bool(n % 2), "negligible": None, "n_seeds": size.seeds}
             for n, r in zip(numbers, rng, strict=True)
-            for claim in ("C3 (TLwD)", "C5 (highest)", "C8 (miss detection, DDQN)")
+            for claim in ["C3 (TLwD)"]
         ]
         return pd.DataFrame(rows)
 
-    def summarise(folder, number, first=0):
+    def summarise(folder, number, first=0, seeds=1, keep=False):
         for sweep in sweeps_of(number, first):
             for part in (sweep, sweep.source):
                 path = tmp_path / folder / part.name / store.MANIFEST
                 path.parent.mkdir(parents=True, exist_ok=True)
                 path.write_text(json.dumps(part.name))
+        out = tmp_path / folder
         with joblib.parallel_config(backend="sequential"):
-            written = summaries.summarise_multiverse(sweeps_of(number, first), Size(seeds=1), tmp_path / folder)
+            written = summaries.summarise_multiverse(sweeps_of(number, first), Size(seeds=seeds), out, keep)
         return {path.name: path.read_bytes() for path in written}
 
     monkeypatch.setattr(summaries, "_of_block", of_block)
     return summarise
 
 
-def test_a_multiverse_is_made_longer_from_its_summary_alone(made_up, tmp_path):
-    whole = made_up("whole", 3 * PER_BLOCK)
-    made_up("parts", 2 * PER_BLOCK)
-    require_earlier(2 * PER_BLOCK, 1, tmp_path / "parts")
-    assert made_up("parts", PER_BLOCK, first=2 * PER_BLOCK) == whole
+def test_a_multiverse_is_made_longer_from_its_summary_alone(made_up):
+    whole = made_up("whole", 2 * PER_BLOCK)
+    made_up("parts", PER_BLOCK)
+    assert made_up("parts", PER_BLOCK, first=PER_BLOCK, keep=True) == whole
     assert set(json.loads(whole["manifests.json"])) == {
-        f"multiverse/{block}{part}"
-        for block in ("000000-000063", "000064-000127", "000128-000191")
-        for part in ("", "-source")
+        f"multiverse/{block}{part}" for block in ("000000-000063", "000064-000127") for part in ("", "-source")
     }
     # Readings that are run once more take the place of what they were.
-    assert made_up("parts", 2 * PER_BLOCK, first=PER_BLOCK) == whole
+    assert made_up("parts", PER_BLOCK, keep=True) == whole
 
 
-def test_readings_before_the_first_must_be_there(made_up, tmp_path):
-    with pytest.raises(ValueError, match=r"first: 64; allowed: readings before it, seeds = 1, in .* which is missing"):
-        require_earlier(64, 1, tmp_path)
-    made_up("parts", PER_BLOCK)
-    with pytest.raises(ValueError, match=r"first: 128; .* where 64 and 63 others are missing"):
-        require_earlier(128, 1, tmp_path / "parts")
-    with pytest.raises(ValueError, match=r"first: 64; .* seeds = 2, .* where 0 and 63 others are missing"):
-        require_earlier(64, 2, tmp_path / "parts")
+def test_only_readings_with_seeds_enough_have_a_part_in_shares_of_verdicts(made_up):
+    made_up("out", 2 * PER_BLOCK)
+    files = made_up("out", PER_BLOCK, seeds=5, keep=True)
+    shares = pd.read_csv(io.BytesIO(files["claims.csv"]))
+    assert set(shares.readings) == {2 * PER_BLOCK}
+    assert set(shares.judged) == {PER_BLOCK}
+    np.testing.assert_allclose(shares.undecided, 1.0)
+    assert (shares.undecided_low > 0.9).all()
+    alone = pd.read_csv(io.BytesIO(made_up("other", PER_BLOCK)["claims.csv"]))
+    assert (alone.judged == 0).all()
+    assert alone.supported.isna().all()
 
 
 @pytest.mark.parametrize(
@@ -164,11 +166,12 @@ def test_readings_before_the_first_must_be_there(made_up, tmp_path):
     [
         (["multiverse", "--readings", "128", "--first", "63"], "first: 63; allowed: a multiple of 64"),
         (["multiverse", "--readings", "128", "--first", "128"], "first: 128; allowed: a multiple of 64"),
-        (["multiverse", "--readings", "128", "--first", "64"], "first: 64; allowed: readings before it"),
+        (["multiverse", "--readings", "128", "--keep"], "keep: True; allowed: where an earlier run left its summary"),
         (["fig6", "--first", "64"], "name: 'fig6'; allowed: multiverse, for which alone --first is"),
+        (["reconstruction", "--keep"], "name: 'reconstruction'; allowed: multiverse, for which alone --keep is"),
     ],
 )
-def test_a_bad_first_reading_is_refused(flags, message, tmp_path, capsys):
+def test_bad_options_are_refused(flags, message, tmp_path, capsys):
     assert main(["run", *flags, "--out", str(tmp_path)]) == 2
     assert message in capsys.readouterr().err
     assert not any(tmp_path.iterdir())
