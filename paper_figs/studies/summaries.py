@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from jrcjax.files import write_text
@@ -57,7 +58,8 @@ def summarise_multiverse(sweeps: tuple[Sweep, ...], size: Size, out: Path, keep:
     found = pd.concat(on_cores(_of_block, ((sweep, size, out) for sweep in sweeps)))
     if keep:
         known = pd.read_csv(path)
-        found = pd.concat([known[~known.reading.isin(found.reading)], found]).sort_values("reading", kind="stable")
+        found = pd.concat([known[~known.reading.isin(found.reading)], found])
+        found = found.iloc[np.argsort(found.reading.to_numpy(), kind="stable")]
     style.save_table(found, path)
     found = pd.read_csv(path)  # so that conclusions are the same whether readings came from this run or an earlier one
     tables = {
