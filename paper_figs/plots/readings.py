@@ -33,8 +33,9 @@ def draw_shares(claims: pd.DataFrame) -> Figure:
         if name != "holds" and not (value > 0).any():
             continue
         bars = np.clip([value - claims[f"{name}_low"], claims[f"{name}_high"] - value], 0.0, None)
+        label = "holds by its estimate" if name == "holds" else name
         look = {"markersize": 2.5, "elinewidth": 0.6, "linestyle": ""}
-        axes.errorbar(100 * value, rows + shift, xerr=100 * bars, marker=marker, color=colour, label=name, **look)
+        axes.errorbar(100 * value, rows + shift, xerr=100 * bars, marker=marker, color=colour, label=label, **look)
     axes.set_yticks(rows, claims.claim, fontsize=5)
     axes.set_ylim(-1, len(claims))
     axes.set_xlim(-2, 102)
@@ -62,6 +63,7 @@ def draw_decisive(sensitivity: pd.DataFrame) -> Figure:
     axes.set_xticks(range(total.shape[1]), list(total.columns), rotation=90, fontsize=5)
     axes.set_yticks(range(len(total)), [f"{claim}, error {error[claim]:.2f}" for claim in total.index], fontsize=5)
     axes.tick_params(length=0)
+    axes.grid(visible=False)
     figure.colorbar(picture, ax=axes, label="total-order index", shrink=0.5)
     figure.suptitle("What decides each effect (error: of the surrogate, cross-validated, over the variance)")
     return figure
@@ -89,7 +91,7 @@ def draw_specification(
         curve.scatter(order, here.value, s=2, c=np.where(here.holds.astype(bool), _GREEN, _ORANGE), zorder=2)
         curve.axhline(limit, color="black", linewidth=0.5)
         curve.set_ylim(*_room(here.value.to_numpy(float), limit))
-        curve.set_title(f"{claim}: holds in {100 * here.holds.astype(bool).mean():.0f} %", fontsize=7)
+        curve.set_title(f"{claim}\nholds in {100 * here.holds.astype(bool).mean():.0f} %", fontsize=7)
         _draw_choices(choices, readings.loc[here.reading.astype(int)], decisive[claim][:_DECIDING])
         choices.set_xlabel("readings in order of the effect", fontsize=7)
     rows[0, 0].set_ylabel("effect")
