@@ -2,7 +2,7 @@
 
     python -m paper_figs.publish --figures out --robustness OUT/robustness/summary
 
-and the same for --multiverse and --reconstruction.
+and the same for --multiverse and --reconstruction, and for the folder of one sweep, --huber.
 
 Without options the texts alone are renewed.
 """
@@ -10,6 +10,7 @@ Without options the texts alone are renewed.
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import sys
 from dataclasses import dataclass
@@ -22,6 +23,7 @@ from paper_figs.analysis import front
 from paper_figs.figures import FIGURES
 from paper_figs.numbers import numbers_of
 from paper_figs.pipeline import results_folder
+from paper_figs.readings_text import HUBER
 from paper_figs.readme import renewed
 from sweeps.options import FLAGS, Folder
 from sweeps.results import store
@@ -31,6 +33,7 @@ ROOT = Path(__file__).parents[1]
 TABLES = ("claims.json", "regret.csv", "seeds_needed.csv")
 STUDIES = ("robustness", "multiverse", "reconstruction")
 """Whose summaries are published as they are."""
+_OUT = re.compile(r" --out [^ \"]+")  # of a command in a manifest
 _TEXTS = ("*.md", "paper_figs/*.md", "docs/**/*.md")
 
 
@@ -46,6 +49,8 @@ class Options:
     """Folder with the summary of a multiverse."""
     reconstruction: Folder = None
     """Folder with the summary of a reconstruction."""
+    huber: Folder = None
+    """Folder of the custom sweep of the Huber loss, see docs/explanation/readings.md."""
     root: Folder = ROOT
     """Folder of the project."""
 
@@ -84,6 +89,22 @@ def publish_figures(out: Path, target: Path) -> list[Path]:
     return [*written, numbers]
 
 
+def publish_study(summary: Path, target: Path) -> Path:
+    """Copies a study's summary; where results lay on the machine that made them stays there."""
+    shutil.copytree(summary, target, dirs_exist_ok=True)
+    manifests = target / "manifests.json"
+    if manifests.is_file():
+        write_text(manifests, _OUT.sub("", manifests.read_text(encoding="utf-8")))
+    return target
+
+
+def publish_sweep(folder: Path, target: Path) -> list[Path]:
+    """Copies table, figure and manifest of a custom sweep; returns the files in `target`."""
+    target.mkdir(parents=True, exist_ok=True)
+    names = (*(f"{folder.name}{suffix}" for suffix in (".csv", ".pdf", ".png")), store.MANIFEST)
+    return [Path(shutil.copyfile(folder / name, target / name)) for name in names]
+
+
 def renew_texts(root: Path) -> list[Path]:
     """Makes the marked parts of all texts anew; returns the texts that changed."""
     changed = []
@@ -106,7 +127,9 @@ def main(args: list[str] | None = None) -> int:
             written += publish_figures(options.figures, root / "published" / "figures")
         for name in STUDIES:
             if summary := getattr(options, name):
-                written.append(Path(shutil.copytree(summary, root / "published" / name, dirs_exist_ok=True)))
+                written.append(publish_study(summary, root / "published" / name))
+        if options.huber:
+            written += publish_sweep(options.huber, root / "published" / HUBER)
         written += renew_texts(root)
     except (ValueError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)

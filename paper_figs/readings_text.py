@@ -10,16 +10,23 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from jrcjax.readings import Loss
 from paper_figs.analysis.intervals import proportion_effect
 from paper_figs.markdown import listed, percent, table
+from paper_figs.plots import style
 from paper_figs.studies import multiverse
 from sweeps.design import in_range
+from sweeps.preset import SOURCES
 from sweeps.studies.multiverse import MULTIVERSE
-from sweeps.studies.readings import READINGS, Reading, as_text, choices, default_unit, range_of, values_at
+from sweeps.studies.readings import READINGS, SOURCE, Reading, as_text, choices, default_unit, range_of, values_at
 from sweeps.studies.reconstruction import NAME as RECONSTRUCTION
 
-NAMED = ("C1 (about 200)", "C3 (TLwD)", "C5 (highest)", "C8 (miss detection, DDQN)", "C13 (highest)", "C15 (episodes)")
+NAMED = ("C3 (TLwD)", "C5 (highest)", "C8 (miss detection, DDQN)", "C13 (highest)", "C15 (episodes)")
 """Statements that the first page names."""
+HUBER = "huber"
+"""The published sweep of the Huber loss."""
+TOGETHER = ("C5 (highest)", "C13 (highest)")
+"""Statements that loss and source decide together."""
 _NEARLY_ALL = 0.9
 _DECIDING = 0.05  # least total-order index, from its lower limit, of a question that is said to decide
 
@@ -32,8 +39,15 @@ def _share(row: Mapping[Hashable, Any], name: str) -> str:
     return f"{percent(row[name])} ({100 * row[f'{name}_low']:.3g} to {100 * row[f'{name}_high']:.3g})"
 
 
+def _holds(row: Mapping[Hashable, Any]) -> str:
+    """Where a statement holds, and where that is unknown."""
+    return _share(row, "holds") + (f", unknown in {percent(row['unknown'])}" if row["unknown"] else "")
+
+
 def _share_of(holds: pd.Series) -> str:
     """The share of readings in which a statement holds."""
+    if holds.empty:
+        return "not among these readings"
     of = proportion_effect(int(holds.sum()), len(holds))
     return _share({"holds": float(of.value), "holds_low": float(of.low), "holds_high": float(of.high)}, "holds")
 
@@ -55,18 +69,37 @@ def readings_list(published: Path) -> str:
     number, by_name = int(claims.readings.max()), {row["claim"]: row for row in claims.to_dict("records")}
     everywhere, nowhere = claims[claims.holds_low > _NEARLY_ALL], claims[claims.holds_high < 1 - _NEARLY_ALL]
     sentences = [
-        f"{name} holds in {_share(by_name[name], 'holds')}; what decides it most (total-order index): "
-        f"{_deciding(sensitivity, name)}."
-        for name in NAMED
+        f"{name} holds in {_holds(by_name[name])}; decided most by {_deciding(sensitivity, name, 2)}." for name in NAMED
     ]
     sentences += [
+        _together(_csv(published, MULTIVERSE.name, "verdicts")),
         f"In more than {percent(_NEARLY_ALL)} of the space, interval included, hold {len(everywhere)} of {len(claims)} "
         f"statements: {'; '.join(everywhere.claim) or 'none'}.",
         f"In less than {percent(1 - _NEARLY_ALL)} of it hold {len(nowhere)}: {'; '.join(nowhere.claim) or 'none'}.",
     ]
-    return (
+    about = (
         f"Shares of {number} readings ([tables](published/{MULTIVERSE.name})) in which the estimate is on the "
-        "statement's side, with 95 % intervals:\n\n" + listed(sentences)
+        "statement's side, with 95 %\nintervals, and total-order indices of what decides it; unknown is where no run "
+        "converges:\n\n"
+    )
+    return about + listed(sentences)
+
+
+def _together(verdicts: pd.DataFrame) -> str:
+    """What the loss and the source decide together."""
+    places = multiverse.places(int(verdicts.reading.max()) + 1)
+    chosen = {"hparams.loss": Loss.HUBER.value, SOURCE: SOURCES.index("table1")}
+    labels = {reading.path: reading.label for reading in READINGS}
+    both = np.all([places[labels[path]] == answer for path, answer in chosen.items()], axis=0)
+    parts = []
+    for claim in TOGETHER:
+        holds = verdicts.query("claim == @claim and reading > 0").set_index("reading").holds.astype(bool)
+        here = both[holds.index.to_numpy(int)]
+        parts.append(f"{claim} holds in {_share_of(holds[here])}, in all others in {_share_of(holds[~here])}")
+    return (
+        "With the Huber loss in the target and Table I's source together, "
+        + "; ".join(parts)
+        + " ([why](docs/explanation/readings.md#why-a-loss-that-does-not-see-rare-costs))."
     )
 
 
@@ -77,7 +110,7 @@ def decided_table(published: Path) -> str:
     rows = [
         (
             row["claim"],
-            _share(row, "holds"),
+            _holds(row),
             _deciding(sensitivity, row["claim"]),
             f"{error[row['claim']]:.2f}" if row["claim"] in error.index else "",
         )
@@ -157,6 +190,25 @@ def reconstruction_list(published: Path) -> str:
     return listed(sentences)
 
 
+def huber_list(published: Path) -> str:
+    """What the Huber loss does to the learners of the target, by where it turns linear."""
+    means = _csv(published, HUBER, HUBER).pivot_table(index=["x", "algorithm"], columns="panel", values="mean")
+
+    def what_of(name: str, x: float) -> str:
+        reward, packets, missed = means.loc[(x, name)]
+        return f"{_short(reward)} per slot, {_short(packets)} packets per episode, miss detection {percent(missed)}"
+
+    deltas = means.index.get_level_values("x").to_numpy(float)
+    first, last = float(deltas.min()), float(deltas.max())
+    sentences = []
+    for x in (first, last):
+        learners = (f"{style.LOOKS[name].label} {what_of(name, x)}" for name in ("ddqn", "dpr", "tlwd"))
+        sentences.append(f"delta = {x:g}: {'; '.join(learners)}.")
+    explored = _short(means.loc[(first, "explored")].iloc[0])
+    optimum = f"The optimal policy: {what_of('optimum', first)}; with the learners' exploration {explored}."
+    return listed([*sentences, optimum])
+
+
 def _short(value: object) -> str:
     return value if isinstance(value, str) else f"{value:.3g}"
 
@@ -166,6 +218,7 @@ BLOCKS: dict[str, Callable[[Path], str]] = {
     "decided": decided_table,
     "questions": questions_table,
     "answers": answers_table,
+    "huber": huber_list,
     "reconstruction": reconstruction_list,
 }
 """Name of a marked part to what makes it from the folder of published results."""

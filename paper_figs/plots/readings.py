@@ -73,7 +73,7 @@ def draw_decisive(sensitivity: pd.DataFrame) -> Figure:
 def draw_specification(
     found: pd.DataFrame, readings: pd.DataFrame, decisive: dict[str, list[str]], limits: dict[str, float]
 ) -> Figure:
-    """Specification curves: a statement's effect in all readings in ascending order, and what these readings are.
+    """Specification curves: a statement's effect in all readings that have one, in ascending order, and what these are.
 
     Args:
       found: as `paper_figs.studies.multiverse.verdicts` gives it.
@@ -84,14 +84,18 @@ def draw_specification(
     figure = Figure(figsize=(style.TWO_COLUMNS[0], 4.2))
     rows = figure.subplots(2, len(limits), height_ratios=(2, 1), squeeze=False, sharex="col")
     for (curve, choices), (claim, limit) in zip(rows.T, limits.items(), strict=True):
-        here = found[(found.claim == claim) & np.isfinite(found.value)]
+        everywhere = found.loc[found.claim == claim]
+        here = everywhere.loc[np.isfinite(everywhere.value)]
         here = here.iloc[np.argsort(here.value.to_numpy(float))]
         order = np.arange(len(here))
         curve.vlines(order, here.ci_low, here.ci_high, color=_GREY, linewidth=0.3)
         curve.scatter(order, here.value, s=2, c=np.where(here.holds.astype(bool), _GREEN, _ORANGE), zorder=2)
         curve.axhline(limit, color="black", linewidth=0.5)
         curve.set_ylim(*_room(here.value.to_numpy(float), limit))
-        curve.set_title(f"{claim}\nholds in {100 * here.holds.astype(bool).mean():.0f} %", fontsize=7)
+        unknown = 100 * (1 - len(here) / len(everywhere))
+        of_unknown = f", unknown in {unknown:.0f} %" if unknown else ""
+        share = 100 * everywhere.holds.astype(bool).mean()
+        curve.set_title(f"{claim}\nholds in {share:.0f} %{of_unknown}", fontsize=7)
         _draw_choices(choices, readings.loc[here.reading.astype(int)], decisive[claim][:_DECIDING])
         choices.set_xlabel("readings in order of the effect", fontsize=7)
     rows[0, 0].set_ylabel("effect")

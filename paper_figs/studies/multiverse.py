@@ -72,6 +72,7 @@ def agreement(of_reading: pd.DataFrame) -> pd.Series:
 def shares(found: pd.DataFrame) -> pd.DataFrame:
     """One row per claim: the share of readings where it holds; of those with seeds enough, that of each verdict.
 
+    A claim is `unknown` where it has no effect, as where no run that it compares ever converges.
     The limits are of 95 %; `readings` and `judged` count what the shares are of.
     """
     rows = []
@@ -79,6 +80,7 @@ def shares(found: pd.DataFrame) -> pd.DataFrame:
         judged = of_claim[of_claim.n_seeds >= Rules().least_seeds]
         row: dict[str, object] = {"claim": claim, "readings": len(of_claim), "judged": len(judged)}
         counts = {"holds": (of_claim.holds.astype(bool).sum(), len(of_claim))}
+        counts["unknown"] = np.isnan(of_claim.value.to_numpy(float)).sum(), len(of_claim)
         counts |= {verdict: ((judged.verdict == verdict).sum(), len(judged)) for verdict in VERDICTS}
         counts["negligible"] = (judged.negligible == True).sum(), len(judged)  # noqa: E712
         for name, (count, number) in counts.items():
@@ -120,8 +122,9 @@ def decisive(found: pd.DataFrame) -> dict[str, pd.DataFrame]:
     sampled = found.query("reading > 0")  # reading 0 is the default and no point of the sample
     sampled = sampled[np.isfinite(sampled.value.to_numpy(float))]
     inputs = places(int(found.reading.max()) + 1)
-    enough = [(c, of_claim) for c, of_claim in sampled.groupby("claim", sort=False) if len(of_claim) >= LEAST_POINTS]
-    tables = on_cores(_decisive, ((str(claim), of_claim, inputs) for claim, of_claim in enough))
+    by_claim = {str(claim): sampled[sampled.claim == claim] for claim in found.claim.unique()}
+    enough = {claim: of_claim for claim, of_claim in by_claim.items() if len(of_claim) >= LEAST_POINTS}
+    tables = on_cores(_decisive, ((claim, of_claim, inputs) for claim, of_claim in enough.items()))
     return {name: pd.concat(t[name] for t in tables) for name in ("sensitivity", "interactions")} if enough else {}
 
 

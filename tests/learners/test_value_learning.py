@@ -186,3 +186,18 @@ def test_epsilon_may_fall_by_the_same_factor_from_episode_to_episode():
     got = [float(schedules.epsilon(jnp.int32(slot), hparams, 100)) for slot in range(900)]
     wanted = [0.8 * (0.05 / 0.8) ** (min(slot // 100, 6) / 6) for slot in range(900)]
     np.testing.assert_allclose(got, wanted, rtol=1e-5)
+
+
+@pytest.mark.parametrize(("p", "cost"), [(0.05, -100.0), (0.2, -100.0), (0.2, -1000.0)])
+def test_the_huber_loss_hardly_sees_a_rare_cost_and_squares_see_its_mean(p, cost):
+    reward, delta = 3.0, 1.0
+    mean = (1 - p) * reward + p * cost
+
+    def minimum(near, loss):
+        values = jnp.linspace(near - 2.0, near + 2.0, 40_001)
+        errors = jnp.stack([reward - values, cost - values])
+        losses = value_learning.td_loss(errors, loss, jnp.float32(delta))
+        return float(values[((1 - p) * losses[0] + p * losses[1]).argmin()])
+
+    assert minimum(reward, Loss.HUBER) == pytest.approx(reward - delta * p / (1 - p), abs=3e-3)
+    assert minimum(mean, Loss.SQUARED) == pytest.approx(mean, rel=2e-3)

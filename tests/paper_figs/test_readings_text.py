@@ -1,11 +1,13 @@
 """What texts say of many readings is what the published tables hold."""
 
+import json
+
 import pandas as pd
 import pytest
 
 from paper_figs import publish, readings_text, readme
 from paper_figs.studies import multiverse
-from sweeps.studies.readings import READINGS
+from sweeps.studies.readings import READINGS, SOURCE, unit_of, values_at
 
 STEP, MARGIN = READINGS[0].label, "margin"
 
@@ -16,6 +18,7 @@ def published(tmp_path):
 
     def share(claim, holds):
         limits = {"holds": holds, "holds_low": max(holds - 0.05, 0.0), "holds_high": min(holds + 0.05, 1.0)}
+        limits["unknown"] = 0.3 if claim.startswith("C3") else 0.0
         return {"claim": claim, "readings": 400} | limits
 
     claims = [share(claim, 0.5) for claim in readings_text.NAMED] + [share("C2 (everywhere)", 0.99), share("C4", 0.01)]
@@ -41,7 +44,19 @@ def published(tmp_path):
     ]
     steps = multiverse.places(41)[STEP]
     verdicts = [{"reading": n, "claim": "C3 (TLwD)", "holds": bool(steps[n] < 1 / 3)} for n in range(41)]
+    verdicts += [
+        {"reading": n, "claim": claim, "holds": of.get("hparams.loss") == of.get(SOURCE) == 1}
+        for claim in readings_text.TOGETHER
+        for n, of in enumerate(map(values_at, unit_of(41)))
+    ]
+    huber = [
+        {"panel": panel, "algorithm": name, "x": x, "mean": 0.5 + x + i}
+        for panel in "abc"
+        for i, name in enumerate(("ddqn", "dpr", "tlwd", "optimum", "explored"))
+        for x in (1.0, 100.0)
+    ]
     tables = {
+        "huber/huber": huber,
         "multiverse/verdicts": verdicts,
         "multiverse/claims": claims,
         "multiverse/sensitivity": sensitivity,
@@ -58,10 +73,16 @@ def published(tmp_path):
 def test_shares_and_what_decides_are_those_of_the_tables(published):
     text = " ".join(readings_text.readings_list(published).split())
     assert "Shares of 400 readings" in text
-    assert f"- C3 (TLwD) holds in 50 % (45 to 55); what decides it most (total-order index): {STEP} 0.80." in text
-    assert "C5 (highest) holds in 50 % (45 to 55); what decides it most (total-order index): no single question" in text
-    assert "hold 1 of 8 statements: C2 (everywhere)." in text
+    assert f"- C3 (TLwD) holds in 50 % (45 to 55), unknown in 30 %; decided most by {STEP} 0.80." in text
+    assert "C5 (highest) holds in 50 % (45 to 55); decided most by no single question." in text
+    assert "hold 1 of 7 statements: C2 (everywhere)." in text
     assert "In less than 10 % of it hold 1: C4." in text
+
+
+def test_what_two_questions_decide_together_is_told_apart(published):
+    text = " ".join(readings_text.readings_list(published).split())
+    assert "C5 (highest) holds in 100 % (" in text
+    assert "to 100), in all others in 0 % (0 to " in text
 
 
 def test_every_question_stands_in_one_table_by_field(published):
@@ -78,7 +99,7 @@ def test_every_question_stands_in_one_table_by_field(published):
 def test_every_statement_has_what_decides_it(published):
     rows = readings_text.decided_table(published).splitlines()[2:]
     assert len(rows) == len(readings_text.NAMED) + 2
-    assert f"| C3 (TLwD) | 50 % (45 to 55) | {STEP} 0.80 | 0.25 |" in rows
+    assert f"| C3 (TLwD) | 50 % (45 to 55), unknown in 30 % | {STEP} 0.80 | 0.25 |" in rows
 
 
 def test_a_statement_holds_by_the_answers_that_decide_it(published):
@@ -99,13 +120,35 @@ def test_promise_and_confirmation_stand_side_by_side(published):
     assert "each of which is the best for some claim: C4." in text
 
 
+def test_what_the_loss_does_is_what_the_table_holds(published):
+    text = " ".join(readings_text.huber_list(published).split())
+    assert "- delta = 1: DDQN 1.5 per slot, 1.5 packets per episode, miss detection 150 %; DPR 2.5 per slot" in text
+    assert "- delta = 100: DDQN 100 per slot" in text
+    assert "The optimal policy: 4.5 per slot, 4.5 packets per episode, miss detection 450 %" in text
+    assert "with the learners' exploration 5.5." in text
+
+
+def test_a_sweep_is_published_without_its_parts(published, tmp_path):
+    root = tmp_path / "project"
+    root.mkdir()
+    for name in ("huber.pdf", "huber.png", "manifest.json", "seeds-000000-000009.nc"):
+        (published / "huber" / name).write_text(name)
+    assert publish.main([f"--huber={published / 'huber'}", f"--root={root}"]) == 0
+    found = {path.name for path in (root / "published" / "huber").iterdir()}
+    assert found == {"huber.csv", "huber.pdf", "huber.png", "manifest.json"}
+
+
 def test_studies_are_published_as_they_are(published, tmp_path):
     root = tmp_path / "project"
     mark = "<!-- made by python -m paper_figs.publish: questions -->\n<!-- end of questions -->\n"
     root.mkdir()
     (root / "README.md").write_text(mark)
+    command = {"command": "python -m sweeps run multiverse --out /somewhere/else --seeds 1"}
+    (published / "multiverse" / "manifests.json").write_text(json.dumps(command))
     options = [f"--{name}={published / name}" for name in ("multiverse", "reconstruction")]
     assert publish.main([*options, f"--root={root}"]) == 0
     assert (root / "published" / "reconstruction" / "tried.csv").is_file()
+    manifests = json.loads((root / "published" / "multiverse" / "manifests.json").read_text())
+    assert manifests == {"command": "python -m sweeps run multiverse --seeds 1"}
     assert readme.renewed(mark, root / "published") == (root / "README.md").read_text()
     assert "hparams.learning_rate" in (root / "README.md").read_text()
