@@ -29,3 +29,8 @@ def test_the_choice_may_be_traced():
     found = jax.jit(jax.vmap(functools.partial(initial_kernel, key, shape)))(np.arange(3))
     wanted = [jax.jit(functools.partial(OF_JAX[choice], shape=shape))(key) for choice in Initialiser]
     np.testing.assert_array_equal(found, wanted)
+
+
+def test_kernels_have_32_bits_where_64_are_allowed():
+    with jax.enable_x64(True):
+        assert initial_kernel(jax.random.key(0), (4, 3), 1).dtype == np.float32
