@@ -31,8 +31,8 @@ class Options:
     smoke: bool = False
     """A tiny version of everything."""
     preset: Preset = "paper"
-    """The paper's parameters: paper, paper_table, or a TOML file of what differs from them, such as one from
-    jrcjax.config.nuscenes."""
+    """The paper's parameters: paper, paper_table, the name of a file in sweeps/presets, or a TOML file of what differs
+    from them, such as one from jrcjax.config.nuscenes."""
     delta: Delta = field(default_factory=Delta)
     """Which differences between learners are negligible."""
 

@@ -2,7 +2,8 @@
 
     python -m paper_figs.publish --figures out --robustness OUT/robustness/summary
 
-and the same for --multiverse and --reconstruction, and for the folder of one sweep, --huber.
+and the same for --multiverse and --reconstruction, for the folder of one sweep, --huber, and for what `make figures`
+wrote with --preset best, --best.
 
 Without options the texts alone are renewed.
 """
@@ -25,7 +26,10 @@ from paper_figs.numbers import numbers_of
 from paper_figs.pipeline import results_folder
 from paper_figs.readings_text import HUBER
 from paper_figs.readme import renewed
+from paper_figs.reconstruction_text import BEST
+from paper_figs.studies.reconstruction import PRESET
 from sweeps.options import FLAGS, Folder
+from sweeps.preset import preset_of
 from sweeps.results import store
 from sweeps.sweep import Size
 
@@ -48,7 +52,9 @@ class Options:
     multiverse: Folder = None
     """Folder with the summary of a multiverse."""
     reconstruction: Folder = None
-    """Folder with the summary of a reconstruction."""
+    """Folder with the summary of a reconstruction, whose best reading becomes the preset `best`."""
+    best: Folder = None
+    """Folder that `make figures` wrote with that preset."""
     huber: Folder = None
     """Folder of the custom sweep of the Huber loss, see docs/explanation/readings.md."""
     root: Folder = ROOT
@@ -60,12 +66,13 @@ def texts(root: Path) -> list[Path]:
     return sorted({path for pattern in _TEXTS for path in root.glob(pattern)})
 
 
-def publish_figures(out: Path, target: Path) -> list[Path]:
+def publish_figures(out: Path, target: Path, preset: str = Size.preset) -> list[Path]:
     """Copies figures, tables, verdicts and manifests, and writes the numbers that texts quote.
 
     Args:
       out: what `make figures` wrote.
       target: folder of published figures.
+      preset: of these figures.
 
     Returns:
       The files in `target`.
@@ -74,7 +81,7 @@ def publish_figures(out: Path, target: Path) -> list[Path]:
       OSError: if something is missing.
     """
     target.mkdir(parents=True, exist_ok=True)
-    folder = results_folder(out, Size())
+    folder = results_folder(out, Size(preset=preset))
     copies = [out / name for name in TABLES]
     names = (*(figure.name for figure in FIGURES), front.NAME)
     copies += [out / f"{name}{suffix}" for name in names for suffix in (".pdf", ".png", ".csv")]
@@ -96,6 +103,12 @@ def publish_study(summary: Path, target: Path) -> Path:
     if manifests.is_file():
         write_text(manifests, _OUT.sub("", manifests.read_text(encoding="utf-8")))
     return target
+
+
+def publish_preset(file: Path, target: Path) -> Path:
+    """Copies a preset to where its name stands for it."""
+    target.mkdir(parents=True, exist_ok=True)
+    return Path(shutil.copyfile(file, target / file.name))
 
 
 def publish_sweep(folder: Path, target: Path) -> list[Path]:
@@ -128,6 +141,11 @@ def main(args: list[str] | None = None) -> int:
         for name in STUDIES:
             if summary := getattr(options, name):
                 written.append(publish_study(summary, root / "published" / name))
+        if options.reconstruction:
+            written.append(publish_preset(options.reconstruction / PRESET, root / "sweeps" / "presets"))
+        if options.best:
+            preset = preset_of(str(root / "sweeps" / "presets" / PRESET))
+            written += publish_figures(options.best, root / "published" / BEST, preset)
         if options.huber:
             written += publish_sweep(options.huber, root / "published" / HUBER)
         written += renew_texts(root)

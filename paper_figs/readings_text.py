@@ -19,7 +19,6 @@ from sweeps.design import in_range
 from sweeps.preset import SOURCES
 from sweeps.studies.multiverse import MULTIVERSE
 from sweeps.studies.readings import READINGS, SOURCE, Reading, as_text, choices, default_unit, range_of, values_at
-from sweeps.studies.reconstruction import NAME as RECONSTRUCTION
 
 NAMED = ("C3 (TLwD)", "C5 (highest)", "C8 (miss detection, DDQN)", "C13 (highest)", "C15 (episodes)")
 """Statements that the first page names."""
@@ -31,7 +30,8 @@ _NEARLY_ALL = 0.9
 _DECIDING = 0.05  # least total-order index, from its lower limit, of a question that is said to decide
 
 
-def _csv(published: Path, study: str, name: str) -> pd.DataFrame:
+def csv_of(published: Path, study: str, name: str) -> pd.DataFrame:
+    """A published table."""
     return pd.read_csv(published / study / f"{name}.csv", keep_default_na=True)
 
 
@@ -65,14 +65,14 @@ def _deciding(sensitivity: pd.DataFrame, claim: str, most: int = 3) -> str:
 
 def readings_list(published: Path) -> str:
     """In which share of the readings the statements hold, and what decides."""
-    claims, sensitivity = (_csv(published, MULTIVERSE.name, name) for name in ("claims", "sensitivity"))
+    claims, sensitivity = (csv_of(published, MULTIVERSE.name, name) for name in ("claims", "sensitivity"))
     number, by_name = int(claims.readings.max()), {row["claim"]: row for row in claims.to_dict("records")}
     everywhere, nowhere = claims[claims.holds_low > _NEARLY_ALL], claims[claims.holds_high < 1 - _NEARLY_ALL]
     sentences = [
         f"{name} holds in {_holds(by_name[name])}; decided most by {_deciding(sensitivity, name, 2)}." for name in NAMED
     ]
     sentences += [
-        _together(_csv(published, MULTIVERSE.name, "verdicts")),
+        _together(csv_of(published, MULTIVERSE.name, "verdicts")),
         f"In more than {percent(_NEARLY_ALL)} of the space, interval included, hold {len(everywhere)} of {len(claims)} "
         f"statements: {'; '.join(everywhere.claim) or 'none'}.",
         f"In less than {percent(1 - _NEARLY_ALL)} of it hold {len(nowhere)}: {'; '.join(nowhere.claim) or 'none'}.",
@@ -105,7 +105,7 @@ def _together(verdicts: pd.DataFrame) -> str:
 
 def decided_table(published: Path) -> str:
     """One row per statement: where it holds, and what decides it."""
-    claims, sensitivity = (_csv(published, MULTIVERSE.name, name) for name in ("claims", "sensitivity"))
+    claims, sensitivity = (csv_of(published, MULTIVERSE.name, name) for name in ("claims", "sensitivity"))
     error = sensitivity.drop_duplicates("claim").set_index("claim").surrogate_error
     rows = [
         (
@@ -121,7 +121,7 @@ def decided_table(published: Path) -> str:
 
 def answers_table(published: Path) -> str:
     """Where the statements of the first page hold, by the answers to the two questions that decide each most."""
-    verdicts, sensitivity = (_csv(published, MULTIVERSE.name, name) for name in ("verdicts", "sensitivity"))
+    verdicts, sensitivity = (csv_of(published, MULTIVERSE.name, name) for name in ("verdicts", "sensitivity"))
     places, by_label = multiverse.places(int(verdicts.reading.max()) + 1), {r.label: r for r in READINGS}
     rows = []
     for claim in NAMED:
@@ -154,7 +154,7 @@ def _searched(reading: Reading) -> str:
 
 def questions_table(published: Path) -> str:
     """One row per question: its field, its default, where it was searched, and which statement it decides most."""
-    sensitivity, default = _csv(published, MULTIVERSE.name, "sensitivity"), values_at(default_unit())
+    sensitivity, default = csv_of(published, MULTIVERSE.name, "sensitivity"), values_at(default_unit())
     rows = []
     for reading in READINGS:
         of_question = sensitivity.query("input == @reading.label").nlargest(1, "total")
@@ -168,35 +168,13 @@ def questions_table(published: Path) -> str:
     return table(("field", "question", "default", "searched", "decides most (total-order index)"), rows)
 
 
-def reconstruction_list(published: Path) -> str:
-    """What the search for the best reading promised, and what fresh seeds gave."""
-    tried, confirmed = (_csv(published, RECONSTRUCTION, name) for name in ("tried", "confirmed"))
-    of_best = confirmed[[("all" in what.split()) for what in confirmed.best_for]]
-    best, default = tried.loc[tried.reading == of_best.reading.iloc[0]].iloc[0], tried[tried.reading == "default"]
-    searched = int(tried.reading.str.startswith("search").sum())
-    values = ", ".join(f"`{r.path}` {_short(best[r.path])}" for r in READINGS)
-    never = [claim for claim, held in confirmed.groupby("claim", sort=False).holds.any().items() if not held]
-    sentences = [
-        f"Of {len(tried)} readings, {searched} of them proposed by the search, {of_best.reading.iloc[0]} agrees best "
-        f"with the text: it promised {percent(best.agreement)}"
-        + (f" where the default has {percent(default.agreement.iloc[0])}" if len(default) else "")
-        + f", and {int(of_best.n_seeds.max())} fresh seeds gave {int(of_best.holds.sum())} of {len(of_best)} "
-        f"statements ({int((of_best.verdict == 'supported').sum())} supported, "
-        f"{int((of_best.verdict == 'contradicted').sum())} contradicted).",
-        f"That reading, a preset in [best.toml](published/{RECONSTRUCTION}/best.toml): {values}.",
-        f"Statements that fresh seeds found in none of the {confirmed.reading.nunique()} confirmed readings, each of "
-        f"which is the best for some claim: {'; '.join(never) or 'none'}.",
-    ]
-    return listed(sentences)
-
-
 def huber_list(published: Path) -> str:
     """What the Huber loss does to the learners of the target, by where it turns linear."""
-    means = _csv(published, HUBER, HUBER).pivot_table(index=["x", "algorithm"], columns="panel", values="mean")
+    means = csv_of(published, HUBER, HUBER).pivot_table(index=["x", "algorithm"], columns="panel", values="mean")
 
     def what_of(name: str, x: float) -> str:
         reward, packets, missed = means.loc[(x, name)]
-        return f"{_short(reward)} per slot, {_short(packets)} packets per episode, miss detection {percent(missed)}"
+        return f"{short(reward)} per slot, {short(packets)} packets per episode, miss detection {percent(missed)}"
 
     deltas = means.index.get_level_values("x").to_numpy(float)
     first, last = float(deltas.min()), float(deltas.max())
@@ -204,12 +182,13 @@ def huber_list(published: Path) -> str:
     for x in (first, last):
         learners = (f"{style.LOOKS[name].label} {what_of(name, x)}" for name in ("ddqn", "dpr", "tlwd"))
         sentences.append(f"delta = {x:g}: {'; '.join(learners)}.")
-    explored = _short(means.loc[(first, "explored")].iloc[0])
+    explored = short(means.loc[(first, "explored")].iloc[0])
     optimum = f"The optimal policy: {what_of('optimum', first)}; with the learners' exploration {explored}."
     return listed([*sentences, optimum])
 
 
-def _short(value: object) -> str:
+def short(value: object) -> str:
+    """A name, or a number with three digits."""
     return value if isinstance(value, str) else f"{value:.3g}"
 
 
@@ -219,6 +198,5 @@ BLOCKS: dict[str, Callable[[Path], str]] = {
     "questions": questions_table,
     "answers": answers_table,
     "huber": huber_list,
-    "reconstruction": reconstruction_list,
 }
 """Name of a marked part to what makes it from the folder of published results."""

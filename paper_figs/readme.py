@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from paper_figs import readings_text
+from paper_figs import readings_text, reconstruction_text
 from paper_figs.claims import words
 from paper_figs.claims.judge import VERDICTS, Judgement, from_json
 from paper_figs.claims.learning_table import LABELS
@@ -250,5 +250,6 @@ BLOCKS: dict[str, Callable[[Path], str]] = {
     "robustness": robustness_list,
     "calibration": calibration_list,
     **readings_text.BLOCKS,
+    **reconstruction_text.BLOCKS,
 }
 """Name of a marked part to what makes it from the folder of published results."""

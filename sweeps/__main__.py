@@ -38,8 +38,8 @@ class Run:
     episodes: Count = None
     """Episodes per seed. Default: 1000 (multiverse and reconstruction 450), or 20 with --smoke."""
     preset: Preset = "paper"
-    """The paper's parameters: paper, paper_table, or a TOML file of what differs from them, such as one from
-    jrcjax.config.nuscenes."""
+    """The paper's parameters: paper, paper_table, the name of a file in sweeps/presets, or a TOML file of what differs
+    from them, such as one from jrcjax.config.nuscenes."""
     out: Annotated[Path, tyro.conf.arg(metavar="DIR")] = Path("out/results")
     """Folder for results."""
     resume: bool = False

@@ -14,6 +14,9 @@ of the settings among them, in the source and in the target alike:
 
 With the last line the source agents have Table I's hyperparameters and settings instead.
 
+Files in the folder `presets` beside this module have names of their own: `best` is the reading in which most of the
+paper's text holds, of all that the published search tried.
+
 A preset is a string: one of `PRESETS`, or the text of a file, so that workers and whoever verifies results have all
 that it says.
 """
@@ -38,7 +41,9 @@ from jrcjax.model.params import EnvParams
 from jrcjax.model.presets import ENVIRONMENTS, PRESETS, paper_params
 from jrcjax.radar.paper import MAX_DENSITY
 
-_ALLOWED = f"{', '.join(PRESETS)}, or a file that ends in .toml"
+NAMED = {path.stem: path for path in sorted((Path(__file__).parent / "presets").glob("*.toml"))}
+"""Files that a name stands for."""
+_ALLOWED = f"{', '.join((*PRESETS, *NAMED))}, or a file that ends in .toml"
 _SOURCE_DENSITY = 2.0
 """Over that of the target, Table I."""
 _SET = "set"
@@ -51,7 +56,7 @@ def preset_of(option: str) -> str:
     """The preset that a command's option names.
 
     Args:
-      option: one of `PRESETS`, or the path of a file.
+      option: one of `PRESETS` or `NAMED`, or the path of a file.
 
     Raises:
       ValueError: naming the file, the field, the value and what is allowed.
@@ -59,10 +64,11 @@ def preset_of(option: str) -> str:
     """
     if option in PRESETS:
         return option
-    if not option.endswith(".toml"):
+    path = NAMED.get(option) or Path(option)
+    if path.suffix != ".toml":
         refuse("preset", option, _ALLOWED)
     try:
-        description = description_of(Path(option).read_text(encoding="utf-8-sig"), also=(_SET,))
+        description = description_of(path.read_text(encoding="utf-8-sig"), also=(_SET,))
         if (environment := description.pop("environment", "target")) != "target":
             refuse("environment", environment, "'target', from which the source follows")
         preset = preset_text(description, description.pop(_SET, {}))

@@ -104,6 +104,15 @@ def is_on_its_side(value: float, relation: str, limit: Limit) -> bool:
     return str(verdicts(value, value, relation, limit)) == SUPPORTED
 
 
+def shortfall(values: np.ndarray, relation: str, limit: Limit) -> np.ndarray:
+    """How far estimates are from the claim's side; at most 0 where they are on it or at its edge."""
+    if relation == "within":
+        least, most = _two(limit)
+        return np.maximum(least - values, values - most)
+    (edge,) = np.ravel(limit)
+    return edge - values if relation == ">" else values - edge
+
+
 def _two(limit: Limit) -> tuple[float, float]:
     if not isinstance(limit, Sequence) or len(limit) != 2:
         raise ValueError(f"limit: {limit!r}; allowed: two numbers for 'within'")

@@ -28,10 +28,11 @@ def claims_in(source: xr.Dataset, target: xr.Dataset) -> list[Judgement]:
 
     Args:
       source: results in its source environment, one point.
-      target: results at its POINTS.
+      target: results at its POINTS, or at those of some figures; of other figures nothing is known.
     """
-    figures = {name: [i for i, point in enumerate(POINTS) if name in point.figures] for name in FIGURES}
-    return claims_of({"fig5a": source} | {name: target.isel(point=points) for name, points in figures.items()})
+    figures = [set(POINTS[i].figures) for i in target["point_of_reading"].values.astype(int)]
+    places = {name: [place for place, of in enumerate(figures) if name in of] for name in FIGURES}
+    return claims_of({"fig5a": source} | {name: target.isel(point=points) for name, points in places.items()})
 
 
 def of_readings(source: xr.Dataset, target: xr.Dataset) -> Iterator[tuple[int, list[Judgement]]]:

@@ -17,6 +17,8 @@ import numpy as np
 import pandas as pd
 
 from jrcjax.files import write_text
+from paper_figs.claims.judge import shortfall
+from paper_figs.claims.table import CLAIMS, number_of
 from paper_figs.plots import readings as plot
 from paper_figs.plots import style
 from paper_figs.studies import multiverse
@@ -33,6 +35,8 @@ _SIGMA = 0.25  # of the first generation, in the unit cube
 _STATIC = np.array([is_static(reading) for reading in READINGS])
 _LEVELS = np.array([len(range_of(reading).levels) for reading in READINGS])
 _DEFAULT = "default"
+ALL = "all"
+"""What the reading is the best for that agrees most with all claims together."""
 
 
 class Tried(NamedTuple):
@@ -77,9 +81,28 @@ def search(effort: Effort, size: Size, out: Path, run: Callable[..., Path]) -> l
         found += generation
     chosen, fresh = choice_of(known + found), of_seeds(size, size.seeds + effort.confirm)
     confirmed = []
-    for one, _ in chosen:
-        confirmed += _kept(confirmation_sweep(one.unit), fresh, out, run, first_seed=size.seeds)
+    for choice in chosen:
+        sweep = confirmation_sweep(choice.reading.unit, choice.figures)
+        confirmed += _kept(sweep, fresh, out, run, first_seed=size.seeds)
     return _write(out / NAME / "summary", known + found, chosen, confirmed)
+
+
+class Choice(NamedTuple):
+    """A reading to confirm, and what it is the best for."""
+
+    reading: Tried
+    best_for: tuple[str, ...]
+    """"all", or numbers of claims."""
+
+    def speaks_of(self, claims: pd.Series) -> pd.Series:
+        """Which statements it is to confirm: all, or those of the claims that it is the best for."""
+        return claims.map(lambda claim: bool({ALL, number_of(claim)} & set(self.best_for))).astype(bool)
+
+    @property
+    def figures(self) -> set[str]:
+        """The figures that these statements are about."""
+        names = pd.Series([claim.claim for claim in CLAIMS])
+        return {claim.sweep for claim, wanted in zip(CLAIMS, self.speaks_of(names), strict=True) if wanted}
 
 
 class _Optimiser:
@@ -135,16 +158,16 @@ def _starts(known: list[Tried], effort: Effort) -> list[np.ndarray]:
     return list(different.values())[::-1][: effort.starts]
 
 
-def choice_of(tried: list[Tried]) -> list[tuple[Tried, list[str]]]:
-    """The readings to confirm, each with what it is the best for: all claims together, or single ones."""
+def choice_of(tried: list[Tried]) -> list[Choice]:
+    """The readings to confirm: the best for all claims together, and the best for each."""
     share = pd.DataFrame([multiverse.agreement(one.verdicts) for one in tried])
-    best = {"all": int(share.mean(axis=1).argmax())}
+    best = {ALL: int(share.mean(axis=1).argmax())}
     for claim in share.columns:  # of those where it holds best, the one that agrees most
         best[claim] = int((share[claim] + 1e-3 * share.mean(axis=1)).argmax())
     chosen: dict[int, list[str]] = {}
     for what, place in best.items():
         chosen.setdefault(place, []).append(what)
-    return [(tried[place], what) for place, what in chosen.items()]
+    return [Choice(tried[place], tuple(what)) for place, what in chosen.items()]
 
 
 def _kept(sweep: Sweep, size: Size, out: Path, run: Callable[..., Path], first_seed: int = 0) -> list[pd.DataFrame]:
@@ -166,10 +189,14 @@ def _verdicts(sweep: Sweep, size: Size, out: Path, first_seed: int) -> pd.DataFr
     return multiverse.verdicts(list(multiverse.of_readings(*data)))
 
 
-def _write(folder: Path, tried: list[Tried], chosen: list, confirmed: list[pd.DataFrame]) -> list[Path]:
+def _write(folder: Path, tried: list[Tried], chosen: list[Choice], confirmed: list[pd.DataFrame]) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
-    (best, _), *_ = chosen
-    tables = {"tried": tried_table(tried), "confirmed": confirmed_table(chosen, confirmed)}
+    best = chosen[0].reading
+    tables = {
+        "tried": tried_table(tried),
+        "confirmed": confirmed_table(chosen, confirmed),
+        "closest": closest_table(tried),
+    }
     preset = preset_text({}, {path: as_text(path, value) for path, value in values_at(best.unit).items()})
     return [
         *(style.save_table(table, folder / f"{name}.csv") for name, table in tables.items()),
@@ -189,20 +216,35 @@ def tried_table(tried: list[Tried]) -> pd.DataFrame:
     )
 
 
-def confirmed_table(chosen: list, confirmed: list[pd.DataFrame]) -> pd.DataFrame:
+def confirmed_table(chosen: list[Choice], confirmed: list[pd.DataFrame]) -> pd.DataFrame:
     """One row per chosen reading and statement: what the search promised, and what fresh seeds gave."""
-    parts = [
-        pd.DataFrame(
-            {
-                "reading": one.name,
-                "best_for": " ".join(what),
-                "claim": of.claim,
-                "promised_value": one.verdicts.value.to_numpy(),
-                "promised": one.verdicts.holds.to_numpy(bool),
-                **{name: of[name] for name in ("value", "ci_low", "ci_high", "verdict", "negligible", "n_seeds")},
-                "holds": of.holds.astype(bool),
-            }
-        )
-        for (one, what), of in zip(chosen, confirmed, strict=True)
-    ]
+    parts = []
+    for choice, of in zip(chosen, confirmed, strict=True):
+        wanted = choice.speaks_of(of.claim).to_numpy()
+        promised, of = choice.reading.verdicts[wanted], of[wanted]
+        columns = {
+            "reading": choice.reading.name,
+            "best_for": " ".join(choice.best_for),
+            "claim": of.claim,
+            "promised_value": promised.value.to_numpy(),
+            "promised": promised.holds.to_numpy(bool),
+            **{name: of[name] for name in ("value", "ci_low", "ci_high", "verdict", "negligible", "n_seeds")},
+            "holds": of.holds.astype(bool),
+        }
+        parts.append(pd.DataFrame(columns))
     return pd.concat(parts, ignore_index=True)
+
+
+def closest_table(tried: list[Tried]) -> pd.DataFrame:
+    """One row per statement: in how many readings its estimate is on its side, and the one that comes closest to it."""
+    claims, rows = {claim.claim: claim for claim in CLAIMS}, []
+    found = pd.concat([one.verdicts.assign(reading=one.name) for one in tried])
+    for name, of in found.groupby("claim", sort=False):
+        known = of[np.isfinite(of.value.to_numpy(float))]
+        row = {"claim": name, "tried": len(of), "known": len(known), "holds": int(of.holds.astype(bool).sum())}
+        if len(known) and name in claims:
+            short = shortfall(known.value.to_numpy(float), claims[str(name)].relation, claims[str(name)].limit)
+            closest = known.iloc[int(short.argmin())]
+            row |= {"closest": closest.reading, "value": closest.value, "shortfall": float(short.min())}
+        rows.append(row)
+    return pd.DataFrame(rows)

@@ -87,7 +87,7 @@ def _handed_on(job: Job, chunk: Chunk) -> Source:
     hand_on = _hand_on(job.spec, chunk.group.config)
     keys_and_points = parallel.groups((chunk.lanes.keys, jnp.asarray(chunk.lanes.points)))
     lanes = [(*which, batch["ddqn"].learner) for which, batch in zip(keys_and_points, chunk.agents, strict=True)]
-    return chunk.lanes.unpadded(joined([hand_on(job.points, batch) for batch in lanes]))
+    return chunk.lanes.unpadded(joined([hand_on(job.table, batch) for batch in lanes]))
 
 
 @functools.cache

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 
 from jrcjax.checks import refuse
@@ -26,6 +28,7 @@ from sweeps.sweep import Size, Sweep
 
 MOST_AGENTS = 1_000_000
 """Agents of one block of seeds, with all points and learners, beyond which a design is refused."""
+_LEAST_ROOM = 64  # for points in a program
 _COPIES = 2  # of an agent while it advances: the old one and the new
 
 
@@ -69,6 +72,13 @@ class Job:
     def points(self) -> Points:
         """The environments and hyperparameters of all points, checked, every leaf with a leading axis of points."""
         return _stacked(self.sweep.environment, self.sweep.design, self.sweep.fixed, self.size.preset)
+
+    @cached_property
+    def table(self) -> Points:
+        """The points as programs take them: the last repeated up to a power of two, so that sweeps share programs."""
+        number = len(self.sweep.design)
+        rows = np.minimum(np.arange(max(_LEAST_ROOM, 2 ** (number - 1).bit_length())), number - 1)
+        return jax.tree.map(lambda leaf: leaf if len(leaf) == 1 else jnp.asarray(np.asarray(leaf)[rows]), self.points)
 
     @cached_property
     def spec(self) -> Spec:

@@ -128,7 +128,7 @@ def advance(job: Job, seeds: range, source: Source | None) -> Iterator[Chunk]:
 
 def _advance_group(job: Job, group: Group, lanes: Lanes, source: Source | None) -> Iterator[Chunk]:
     episodes = group.config.episodes
-    chunk, points = chunk_of(episodes), job.points  # all of them, so that groups of any number have the same shapes
+    chunk, points = chunk_of(episodes), job.table  # of all points, so that groups of any number have the same shapes
     program = program_of(job.sweep.learners, job.spec, group.config, chunk)
     of_lane: Any = jax.tree.map(lambda leaf: leaf[job.source_points[lanes.points], lanes.seeds], source)
     started = parallel.groups((lanes.keys, of_lane, jnp.asarray(lanes.points)))

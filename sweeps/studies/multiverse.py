@@ -6,7 +6,7 @@ added, resumed, or sent to other machines.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -59,19 +59,30 @@ def _paths(values: Sequence[Mapping[str, float]]) -> dict[str, str]:
     return {path: path for path in dict.fromkeys(path for row in values for path in row)}
 
 
-def block_sweep(study: str, numbers: Sequence[int], values: Sequence[Mapping[str, float]]) -> Sweep:
-    """All points of some readings, as one program for each optimiser and n.
+def points_of(figures: Collection[str]) -> tuple[int, ...]:
+    """Places in POINTS of what some figures need, of the target as it is at least."""
+    return tuple(i for i, point in enumerate(POINTS) if not i or set(point.figures) & set(figures))
+
+
+def block_sweep(
+    study: str,
+    numbers: Sequence[int],
+    values: Sequence[Mapping[str, float]],
+    points: Sequence[int] = range(len(POINTS)),
+) -> Sweep:
+    """Points of some readings, as one program for each optimiser and n.
 
     Args:
       study: folder of the results.
       numbers: of the readings, ascending.
       values: of each reading by path; what is left out is as by default.
+      points: places in POINTS.
     """
     number = {"prioritised": 1.0}
     rows = [
-        {"reading": float(reading), "point_of_reading": float(i)} | _target(of) | number | dict(point.values)
+        {"reading": float(reading), "point_of_reading": float(i)} | _target(of) | number | dict(POINTS[i].values)
         for reading, of in zip(numbers, values, strict=True)
-        for i, point in enumerate(POINTS)
+        for i in points
     ]
     uniform = {path: path for path in fig9.PATHS.values() if path}
     sources = [{"reading": float(n)} | _source(of) for n, of in zip(numbers, values, strict=True)]
@@ -92,7 +103,7 @@ def block_sweep(study: str, numbers: Sequence[int], values: Sequence[Mapping[str
         learners=TARGET_LEARNERS,
         design=design.table(rows, _POINT_PATHS | _paths([_target(of) for of in values]) | uniform),
         source=source,
-        source_points=tuple(np.repeat(range(len(numbers)), len(POINTS)).tolist()),
+        source_points=tuple(np.repeat(range(len(numbers)), len(points)).tolist()),
         own=True,
         seeds_per_part=SIZE.seeds,
     )

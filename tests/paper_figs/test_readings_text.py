@@ -5,8 +5,9 @@ import json
 import pandas as pd
 import pytest
 
-from paper_figs import publish, readings_text, readme
+from paper_figs import publish, readings_text, readme, reconstruction_text
 from paper_figs.studies import multiverse
+from sweeps.preset import preset_of
 from sweeps.studies.readings import READINGS, SOURCE, unit_of, values_at
 
 STEP, MARGIN = READINGS[0].label, "margin"
@@ -28,20 +29,29 @@ def published(tmp_path):
         {"claim": "C3 (TLwD)", "input": MARGIN, "total": 0.2, "total_low": 0.01, "total_high": 0.3} | index,
     ]
     tried = [
-        {"reading": name, "agreement": agreement} | {reading.path: 0.5 for reading in READINGS}
-        for name, agreement in (("default", 0.2), ("multiverse 3", 0.4), ("search 0", 0.6))
+        {"reading": name, "agreement": agreement} | {reading.path: value for reading in READINGS}
+        for name, agreement, value in (
+            ("default", 0.2, 0.5),
+            ("multiverse 3", 0.4, 0.5),
+            ("search 0", 0.6, 0.25),
+            ("search 1", 0.5, 0.5),
+        )
     ]
+
+    def seen(reading, best_for, claim, promised, value, low, high, verdict):
+        row = {"reading": reading, "best_for": best_for, "claim": claim, "promised_value": 1.0, "promised": promised}
+        row |= {"value": value, "ci_low": low, "ci_high": high, "verdict": verdict}
+        return row | {"n_seeds": 100, "holds": verdict == "supported"}
+
     confirmed = [
-        {
-            "reading": "search 0",
-            "best_for": "all C3",
-            "claim": claim,
-            "holds": holds,
-            "verdict": verdict,
-            "n_seeds": 100,
-        }
-        for claim, holds, verdict in (("C3 (TLwD)", True, "supported"), ("C4", False, "contradicted"))
+        seen("search 0", "all C3 C11", "C3 (TLwD)", True, 2.0, 1.0, 3.0, "supported"),
+        seen("search 0", "all C3 C11", "C4", True, 0.5, 0.4, 0.6, "contradicted"),
+        seen("search 0", "all C3 C11", "C5 (highest)", True, 0.5, 0.4, 0.6, "contradicted"),
+        seen("search 0", "all C3 C11", "C11", False, -1.0, -2.0, 0.0, "undecided"),
+        seen("search 1", "C5", "C5 (highest)", True, 2.0, 1.5, 2.5, "supported"),
     ]
+    holds = {"C3 (TLwD)": 3, "C4": 1, "C5 (highest)": 2, "C11": 0}
+    closest = [{"claim": claim, "tried": 4, "known": 4, "holds": held} for claim, held in holds.items()]
     steps = multiverse.places(41)[STEP]
     verdicts = [{"reading": n, "claim": "C3 (TLwD)", "holds": bool(steps[n] < 1 / 3)} for n in range(41)]
     verdicts += [
@@ -62,6 +72,7 @@ def published(tmp_path):
         "multiverse/sensitivity": sensitivity,
         "reconstruction/tried": tried,
         "reconstruction/confirmed": confirmed,
+        "reconstruction/closest": closest,
     }
     for name, rows in tables.items():
         file = tmp_path / f"{name}.csv"
@@ -113,11 +124,22 @@ def test_a_statement_holds_by_the_answers_that_decide_it(published):
 
 
 def test_promise_and_confirmation_stand_side_by_side(published):
-    text = " ".join(readings_text.reconstruction_list(published).split())
-    assert "Of 3 readings, 1 of them proposed by the search, search 0 agrees best with the text" in text
-    assert "promised 60 % where the default has 20 %, and 100 fresh seeds gave 1 of 2 statements" in text
-    assert "(1 supported, 1 contradicted)" in text
-    assert "each of which is the best for some claim: C4." in text
+    text = " ".join(reconstruction_text.best_list(published).split())
+    assert "Of 4 readings, 2 of them proposed by the search, search 0 agrees best with the text" in text
+    assert "promised 3 of 4 statements (agreement 60 %, default 20 %), and 100 fresh seeds gave 1:" in text
+    assert ": 1 supported, 2 contradicted, 1 undecided." in text
+    assert "in the best reading for each claim support: C5 (highest)." in text
+    assert "in none of the 4 readings, so in at most 77.6 % of the space: C11." in text  # 1 - 0.05 ** (1 / 2)
+    assert "nor in that for their claim: C4." in text
+    rows = reconstruction_text.confirmed_table(published).splitlines()[2:]
+    assert (
+        "| C5 (highest) | 2 of 4 | 1, 0.5 (0.4 to 0.6): contradicted | search 1 | 1, 2 (1.5 to 2.5): supported |"
+        in rows
+    )
+    assert "| C11 | 0 of 4 | 1, -1 (-2 to 0): undecided | search 0 | 1, -1 (-2 to 0): undecided |" in rows
+    values = reconstruction_text.best_values_table(published).splitlines()[2:]
+    assert len(values) == len(READINGS)
+    assert f"| `{READINGS[0].path}` | {STEP} | 0.5 | 0.25 |" in values
 
 
 def test_what_the_loss_does_is_what_the_table_holds(published):
@@ -145,9 +167,11 @@ def test_studies_are_published_as_they_are(published, tmp_path):
     (root / "README.md").write_text(mark)
     command = {"command": "python -m sweeps run multiverse --out /somewhere/else --seeds 1"}
     (published / "multiverse" / "manifests.json").write_text(json.dumps(command))
+    (published / "reconstruction" / "best.toml").write_text('[set]\n"hparams.learning_rate" = 3e-5\n')
     options = [f"--{name}={published / name}" for name in ("multiverse", "reconstruction")]
     assert publish.main([*options, f"--root={root}"]) == 0
     assert (root / "published" / "reconstruction" / "tried.csv").is_file()
+    assert "3e-05" in preset_of(str(root / "sweeps" / "presets" / "best.toml"))
     manifests = json.loads((root / "published" / "multiverse" / "manifests.json").read_text())
     assert manifests == {"command": "python -m sweeps run multiverse --seeds 1"}
     assert readme.renewed(mark, root / "published") == (root / "README.md").read_text()

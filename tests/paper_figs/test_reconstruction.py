@@ -3,13 +3,17 @@
 import numpy as np
 import pandas as pd
 import pytest
+import worlds
 
 from jrcjax.config.paths import parameter_at
+from paper_figs.claims.table import CLAIMS as TABLE
+from paper_figs.claims.table import number_of
 from paper_figs.studies import multiverse, reconstruction
 from sweeps.__main__ import main
 from sweeps.preset import SOURCES, base_of, preset_of
+from sweeps.studies.multiverse import points_of
 from sweeps.studies.readings import PER_BLOCK, READINGS, SOURCE, default_unit, is_static, unit_of, values_at
-from sweeps.studies.reconstruction import Effort, effort_of
+from sweeps.studies.reconstruction import Effort, confirmation_sweep, effort_of
 from sweeps.sweep import Size
 
 RATE = [reading.path for reading in READINGS].index("hparams.learning_rate")
@@ -41,7 +45,8 @@ def small_steps_only(monkeypatch):
     def remember(make):
         def kept(*args):
             sweep = make(*args)
-            units[sweep.name] = args[-1] if isinstance(args[-1], list) else [args[-1]]
+            of_sweep = next(arg for arg in args if isinstance(arg, list | np.ndarray))
+            units[sweep.name] = of_sweep if isinstance(of_sweep, list) else [of_sweep]
             return sweep
 
         return kept
@@ -147,10 +152,63 @@ def test_the_best_of_a_multiverse_are_starts_and_may_be_chosen(tmp_path):
     starts = reconstruction._starts(known, Effort(starts=2))
     np.testing.assert_array_equal(starts[0], unit_of(1, best)[0])  # and not the next, of the same block
     np.testing.assert_array_equal(starts[1], default_unit())
-    (chosen, what), *_ = reconstruction.choice_of(known)
-    assert chosen.name == f"multiverse {best}"
-    assert what[0] == "all"
-    assert chosen.agreement == pytest.approx(10 / 15)
+    first, *_ = reconstruction.choice_of(known)
+    assert first.reading.name == f"multiverse {best}"
+    assert first.best_for[0] == reconstruction.ALL
+    assert first.reading.agreement == pytest.approx(10 / 15)
+
+
+def tried_with(name, holds, values):
+    of = pd.DataFrame({"claim": [c.claim for c in TABLE], "value": values, "holds": holds})
+    of = of.assign(ci_low=0.0, ci_high=0.0, verdict="undecided", negligible=None, n_seeds=1)
+    return reconstruction.Tried(name, default_unit(), of)
+
+
+def test_a_reading_is_confirmed_where_it_is_the_best():
+    number = np.array([number_of(c.claim) for c in TABLE])
+    most = tried_with("most", number != "C15", 1.0)
+    other = tried_with("other", number == "C15", 1.0)
+    for_all, for_one = choices = reconstruction.choice_of([most, other])
+    assert for_all.reading.name == "most"
+    assert for_all.speaks_of(most.verdicts.claim).all()
+    assert for_all.figures == {"fig5a", "fig5b", "fig6", "fig7", "fig8", "fig9"}
+    assert for_one.best_for == ("C15",)
+    assert for_one.figures == {"fig9"}
+    sweeps = [confirmation_sweep(choice.reading.unit, choice.figures) for choice in choices]
+    assert [len(sweep.design.values("reading")) for sweep in sweeps] == [10, 2]
+    assert sweeps[0].name != sweeps[1].name  # one reading, other points
+    table = reconstruction.confirmed_table(choices, [most.verdicts, other.verdicts])
+    of_other = table[table.reading == "other"]
+    assert set(of_other.claim.map(number_of)) == {"C15"}
+    assert of_other.holds.all()
+    assert of_other.promised.all()
+
+
+def test_claims_are_judged_at_the_points_of_their_figures_alone():
+    world = worlds.as_the_paper_says()
+    target = world["fig9"].assign_coords(point_of_reading=("point", list(points_of({"fig9"}))))
+    judged = {j.claim: j for j in multiverse.claims_in(world["fig5a"], target)}
+    assert {j.verdict for j in judged.values() if number_of(j.claim) in ("C1", "C15")} == {"supported"}
+    assert {j.verdict for j in judged.values() if number_of(j.claim) in ("C5", "C10", "C13")} == {"undecided"}
+
+
+def test_the_closest_reading_is_told_with_what_it_lacks():
+    first, second = (tried_with(name, False, value) for name, value in (("first", -2.0), ("second", 3.0)))
+    first.verdicts.loc[first.verdicts.claim == "C11", "value"] = np.nan
+    table = reconstruction.closest_table([first, second]).set_index("claim")
+    for claim in TABLE:
+        row = table.loc[claim.claim]
+        if claim.claim == "C11":
+            assert (row.known, row.closest) == (1, "second")
+        elif isinstance(claim.limit, float | int):
+            above = claim.relation == ">"
+            assert row.closest == ("second" if above else "first")
+            assert row.shortfall == pytest.approx(claim.limit - 3.0 if above else -2.0 - claim.limit)
+        else:
+            least, most = claim.limit
+            assert row.shortfall == pytest.approx(min(max(least - v, v - most) for v in (-2.0, 3.0)))
+    assert (table.holds == 0).all()
+    assert (table.tried == 2).all()
 
 
 def test_agreement_weighs_claims_and_not_statements():

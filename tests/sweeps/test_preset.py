@@ -13,7 +13,7 @@ from paper_figs.__main__ import main as figures_main
 from sweeps.__main__ import main as sweeps_main
 from sweeps.engine.estimate import block_seconds
 from sweeps.engine.job import Job
-from sweeps.preset import check_preset, environment_of, preset_of, slots_of
+from sweeps.preset import NAMED, check_preset, environment_of, preset_of, slots_of
 from sweeps.results.configuration import digest_of
 from sweeps.studies.registry import SWEEPS
 from sweeps.sweep import Size, Study, size_of
@@ -89,6 +89,18 @@ def test_slots_of_an_episode_are_those_of_the_file(traffic):
         block_seconds(Job(SWEEPS["fig8"], Size(preset=p, pretraining=0)), 8) for p in (preset, "paper")
     )
     np.testing.assert_allclose(of_file, of_paper / 5)
+
+
+def test_a_file_in_the_folder_of_presets_has_a_name(traffic, monkeypatch):
+    monkeypatch.setitem(NAMED, "traffic", traffic)
+    assert preset_of("traffic") == preset_of(str(traffic))
+    with pytest.raises(ValueError, match=r"preset: 'trafic'; allowed: paper, paper_table, "):
+        preset_of("trafic")
+
+
+def test_all_named_presets_are_those_of_the_figures_environments():
+    for name in NAMED:
+        check_preset(preset_of(name))
 
 
 def test_a_study_with_its_own_presets_takes_no_file(traffic):

@@ -1,0 +1,125 @@
+"""The parts of texts made from the published search for the reading in which most of the paper's text holds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from paper_figs.analysis.intervals import proportion_effect
+from paper_figs.claims.table import number_of
+from paper_figs.markdown import listed, percent, table
+from paper_figs.readings_text import csv_of, short
+from paper_figs.studies.reconstruction import ALL
+from sweeps.studies.readings import READINGS
+from sweeps.studies.reconstruction import NAME
+
+BEST = "best"
+"""The published figures in the best reading that the search found, and its name as a preset."""
+
+
+def _tables(published: Path) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
+    tried, confirmed, closest = (csv_of(published, NAME, name) for name in ("tried", "confirmed", "closest"))
+    return tried, confirmed.assign(number=confirmed.claim.map(number_of)), closest
+
+
+def _for(confirmed: pd.DataFrame, what: str) -> pd.DataFrame:
+    """The rows of the reading that is the best for "all" or for a claim."""
+    return confirmed.loc[[what in best_for.split() for best_for in confirmed.best_for]]
+
+
+def best_list(published: Path) -> str:
+    """What the best reading promised and fresh seeds gave, and what was found nowhere."""
+    tried, confirmed, closest = _tables(published)
+    best = _for(confirmed, ALL)
+    name, seeds = best.reading.iloc[0], int(best.n_seeds.max())
+    agreement = tried.set_index("reading").agreement
+    searched, nowhere = int(tried.reading.str.startswith("search").sum()), closest.loc[closest.holds == 0]
+    most = float(proportion_effect(0, len(tried) - searched).high)
+    sentences = [
+        f"Of {len(tried)} readings, {searched} of them proposed by the search, {name} agrees best with the text: "
+        f"the search promised {int(best.promised.sum())} of {len(best)} statements"
+        + (
+            f" (agreement {percent(agreement[name])}, default {percent(agreement['default'])})"
+            if "default" in agreement
+            else ""
+        )
+        + f", and {seeds} fresh seeds gave {int(best.holds.sum())}: {_count(best)}.",
+        f"Beyond that reading, which is the best for all claims together, fresh seeds in the best reading for each "
+        f"claim support: {_names(_supported_beyond(confirmed, best))}.",
+        f"On their side in none of the {len(tried)} readings, so in at most {percent(most)} of the space: "
+        f"{_names(nowhere.claim)}.",
+        f"On their side in some of them, and supported by fresh seeds neither in the best reading for all nor in that "
+        f"for their claim: {_names(_unconfirmed(confirmed, nowhere))}.",
+    ]
+    return listed(sentences)
+
+
+def _count(best: pd.DataFrame) -> str:
+    """Verdicts, counted."""
+    return ", ".join(f"{(best.verdict == v).sum()} {v}" for v in ("supported", "contradicted", "undecided"))
+
+
+def _names(claims: pd.Series | list[str]) -> str:
+    return "; ".join(claims) or "none"
+
+
+def _supported(confirmed: pd.DataFrame) -> set[str]:
+    return set(confirmed.claim[confirmed.verdict == "supported"])
+
+
+def _supported_beyond(confirmed: pd.DataFrame, best: pd.DataFrame) -> list[str]:
+    found = _supported(confirmed) - _supported(best)
+    return [claim for claim in confirmed.claim.unique() if claim in found]
+
+
+def _unconfirmed(confirmed: pd.DataFrame, nowhere: pd.DataFrame) -> list[str]:
+    known = _supported(confirmed) | set(nowhere.claim)
+    return [claim for claim in confirmed.claim.unique() if claim not in known]
+
+
+def best_values_table(published: Path) -> str:
+    """The best reading, answer by answer, beside the default."""
+    tried, confirmed, _ = _tables(published)
+    by_name = tried.set_index("reading")
+    best = by_name.loc[_for(confirmed, ALL).reading.iloc[0]]
+    rows = [(f"`{r.path}`", r.label, short(by_name[r.path].get("default", "")), short(best[r.path])) for r in READINGS]
+    return table(("field", "question", "default", "best reading"), rows)
+
+
+def confirmed_table(published: Path) -> str:
+    """One row per statement: promise and confirmation in the best reading for all, and in the best for its claim."""
+    _, confirmed, closest = _tables(published)
+    rows = []
+    for row in closest.to_dict("records"):
+        of_claim = confirmed.loc[confirmed.claim == row["claim"]]
+        cells = []
+        for what in (ALL, number_of(str(row["claim"]))):
+            of_reading = _for(of_claim, what).to_dict("records")
+            cells.append(_side_by_side(of_reading[0]) if of_reading else "")
+        reading = _for(of_claim, number_of(str(row["claim"]))).reading
+        rows.append((str(row["claim"]), f"{row['holds']} of {row['tried']}", cells[0], *reading.iloc[:1], cells[1]))
+    head = (
+        "statement",
+        "on its side in",
+        "best for all: promised, confirmed",
+        "best for its claim",
+        "promised, confirmed",
+    )
+    return table(head, rows)
+
+
+def _side_by_side(row: Mapping[Hashable, Any]) -> str:
+    interval = f" ({row['ci_low']:.3g} to {row['ci_high']:.3g})" if np.isfinite(row["ci_low"]) else ""
+    return f"{row['promised_value']:.3g}, {row['value']:.3g}{interval}: {row['verdict']}"
+
+
+BLOCKS: dict[str, Callable[[Path], str]] = {
+    "best": best_list,
+    "best_values": best_values_table,
+    "confirmed": confirmed_table,
+}
+"""Name of a marked part to what makes it from the folder of published results."""
