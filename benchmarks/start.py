@@ -51,7 +51,7 @@ from sweeps.studies import registry
 from sweeps.sweep import Size
 sweep = registry.SWEEPS[sys.argv[1]]
 job = Job(sweep, Size())
-points, config = job.points, job.groups[0].config
+points, config = job.table, job.groups[0].config
 lanes = parallel.padded(1)  # of every group
 source = None
 if sweep.source:

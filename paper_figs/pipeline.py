@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,7 +23,7 @@ from paper_figs.figures import FIGURES, NUMBERS, PaperFigure
 from paper_figs.plots import front as front_plot
 from paper_figs.plots import style
 from sweeps.engine.estimate import in_words
-from sweeps.engine.run import expected_seconds, run_sweep
+from sweeps.engine.run import compile_ahead, expected_seconds, run_sweep
 from sweeps.preset import environment_of, label_of, slots_of
 from sweeps.results import store
 from sweeps.studies.registry import SWEEPS
@@ -69,17 +70,19 @@ def make_figures(
     rules.delta.check()
     out.mkdir(parents=True, exist_ok=True)
     folder = results_folder(out, size)
-    seconds = expected_seconds([SWEEPS[figure.name] for figure in wanted], size, folder)
-    console.print(
-        f"figures: {len(wanted)}, seeds: {size.seeds}, episodes: {size.episodes}; "
-        f"about {in_words(seconds)} in all, and what has to be compiled"
-    )
+    sweeps = [SWEEPS[figure.name] for figure in wanted]
     written, results, slots = _Written(), {}, slots_of(size.preset)
-    for figure in wanted:
-        found = run_sweep(SWEEPS[figure.name], size, folder, console, resume=True)
-        results[figure.name] = store.load(found, size.seeds)
-        _write_figure(figure, results[figure.name], slots, out, written)
-        written.manifests[figure.name] = (found / store.MANIFEST).read_text(encoding="utf-8")
+    with contextlib.closing(compile_ahead(sweeps, size, folder)) as ahead:
+        seconds = expected_seconds(sweeps, size, folder)
+        console.print(
+            f"figures: {len(wanted)}, seeds: {size.seeds}, episodes: {size.episodes}; "
+            f"about {in_words(seconds)} in all, and what has to be compiled"
+        )
+        for figure in wanted:
+            found = run_sweep(SWEEPS[figure.name], size, folder, console, resume=True, ahead=ahead)
+            results[figure.name] = store.load(found, size.seeds)
+            _write_figure(figure, results[figure.name], slots, out, written)
+            written.manifests[figure.name] = (found / store.MANIFEST).read_text(encoding="utf-8")
     if "fig5b" in results:
         _write_front(results["fig5b"], size, out, written)
     _write_tables(results, slots, out, written)

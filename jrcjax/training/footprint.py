@@ -34,21 +34,25 @@ def agent_bytes(learner: Learner, spec: Spec, config: Config) -> int:
     return words + sum(math.prod(leaf.shape) * leaf.dtype.itemsize for leaf in jax.tree.leaves(jax.eval_shape(agent)))
 
 
+def most_bytes(learner: Learner, spec: Spec, config: Config) -> dict[str, int]:
+    """By setting, what it adds to `agent_bytes` at most: a bound that needs no tracing."""
+    widths = (len(spec.shape), *config.hidden, spec.num_actions)
+    # 64 bytes per transition, weights with their target and two moments, random words of an episode.
+    return {
+        "config.replay_capacity": 64 * config.replay_capacity,
+        "config.demonstrations": 64 * config.demonstrations,
+        "config.hidden": 16 * sum(a * b for a, b in itertools.pairwise(widths)),
+        "config.batch_size": 4 * spec.episode_slots * learner.num_words,
+    }
+
+
 def check_memory(learner: Learner, spec: Spec, config: Config, agents: int) -> None:
     """Refuses agents that this machine can't hold.
 
     Raises:
       ValueError: naming the setting that takes the most, with the estimate.
     """
-    widths = (len(spec.shape), *config.hidden, spec.num_actions)
-    # Upper bounds: 64 bytes per transition, weights with their target and two moments, random words of an episode.
-    at_most = {
-        "config.replay_capacity": 64 * config.replay_capacity,
-        "config.demonstrations": 64 * config.demonstrations,
-        "config.hidden": 16 * sum(a * b for a, b in itertools.pairwise(widths)),
-        "config.batch_size": 4 * spec.episode_slots * learner.num_words,
-    }
-    available = physical_memory()
+    available, at_most = physical_memory(), most_bytes(learner, spec, config)
     if _COPIES * agents * sum(at_most.values()) <= available:  # without tracing, in nearly all cases
         return
     needed = _COPIES * agents * agent_bytes(learner, spec, config)

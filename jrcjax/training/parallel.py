@@ -154,14 +154,27 @@ def pad_agents(tree: Any, count: int) -> Any:
 
 
 def groups(tree: Any) -> list[Any]:
-    """Agents in groups that give each device that works on them one block, the last of them padded by `pad_agents`.
+    """Agents in groups that give each device that works on them one block, the last of them padded as by `pad_agents`.
 
     A function compiled for such a group is the same code for any number of agents, and so are an agent's bits.
     """
     count = jax.tree.leaves(tree)[0].shape[0]
-    size = block_for(count) * devices_for(count)
-    whole = pad_agents(tree, padded(count))
-    return [jax.tree.map(lambda leaf, i=i: leaf[i : i + size], whole) for i in range(0, padded(count), size)]
+    size = group_size(count)
+    rows = np.minimum(np.arange(padded(count)), count - 1).reshape(-1, size)
+    # On the host: as programs these would be compiled for every leaf and every number of agents.
+    return [jax.tree.map(functools.partial(_taken, rows=of_group), tree) for of_group in rows]
+
+
+def group_size(count: int) -> int:
+    """Agents of one of the `groups` of so many agents."""
+    return block_for(count) * devices_for(count)
+
+
+def _taken(leaf: Any, rows: np.ndarray) -> Any:
+    if isinstance(leaf, jax.Array) and jnp.issubdtype(leaf.dtype, jax.dtypes.prng_key):
+        data = jnp.asarray(np.asarray(jax.random.key_data(leaf))[rows])
+        return jax.random.wrap_key_data(data, impl=jax.random.key_impl(leaf))
+    return np.asarray(leaf)[rows]
 
 
 def over_agents(function: Callable, block: int | None = None, *, in_place: bool = False) -> Callable:

@@ -84,14 +84,15 @@ def _acting(chunk: Chunk) -> dict[str, AgentState]:
 
 def _handed_on(job: Job, chunk: Chunk) -> Source:
     """Weights and demonstrations of a group's agents, [points, seeds, ...]."""
-    hand_on = _hand_on(job.spec, chunk.group.config)
-    keys_and_points = parallel.groups((chunk.lanes.keys, jnp.asarray(chunk.lanes.points)))
+    handed_on = hand_on(job.spec, chunk.group.config)
+    keys_and_points = parallel.groups((chunk.lanes.keys, chunk.lanes.points.astype(np.int32)))
     lanes = [(*which, batch["ddqn"].learner) for which, batch in zip(keys_and_points, chunk.agents, strict=True)]
-    return chunk.lanes.unpadded(joined([hand_on(job.table, batch) for batch in lanes]))
+    return chunk.lanes.unpadded(joined([handed_on(job.table, batch) for batch in lanes]))
 
 
 @functools.cache
-def _hand_on(spec: Spec, config: Config) -> Callable:
+def hand_on(spec: Spec, config: Config) -> Callable:
+    """(points, lanes = (keys, points' numbers, states of DDQN)) to what these agents hand on, compiled."""
     learner = make_learner("ddqn", spec, config)
 
     def one(points, agent):

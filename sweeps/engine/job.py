@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -15,11 +16,11 @@ import numpy as np
 from jrcjax.checks import refuse
 from jrcjax.config.paths import Points, parameter_at
 from jrcjax.config.stacking import Values, settings, stacked
-from jrcjax.learners import Spec, make_learner
+from jrcjax.learners import Learner, Spec, make_learner
 from jrcjax.learners.hparams import Config
 from jrcjax.machine import physical_memory
 from jrcjax.training import parallel
-from jrcjax.training.footprint import agent_bytes
+from jrcjax.training.footprint import agent_bytes, most_bytes
 from jrcjax.training.rollout import spec_of
 from sweeps.design import Design
 from sweeps.engine.reference import Reference, reference_of
@@ -68,17 +69,19 @@ class Job:
         rows = {config: tuple(i for i, c in enumerate(configs) if c == config) for config in dict.fromkeys(configs)}
         return tuple(Group(of, config) for config, of in rows.items())
 
-    @cached_property
+    @property
     def points(self) -> Points:
         """The environments and hyperparameters of all points, checked, every leaf with a leading axis of points."""
-        return _stacked(self.sweep.environment, self.sweep.design, self.sweep.fixed, self.size.preset)
+        return _stacked(*self._of_points)
 
-    @cached_property
+    @property
     def table(self) -> Points:
         """The points as programs take them: the last repeated up to a power of two, so that sweeps share programs."""
-        number = len(self.sweep.design)
-        rows = np.minimum(np.arange(max(_LEAST_ROOM, 2 ** (number - 1).bit_length())), number - 1)
-        return jax.tree.map(lambda leaf: leaf if len(leaf) == 1 else jnp.asarray(np.asarray(leaf)[rows]), self.points)
+        return _table(*self._of_points)
+
+    @property
+    def _of_points(self) -> tuple[str, Design, tuple[tuple[str, float], ...], str]:
+        return self.sweep.environment, self.sweep.design, self.sweep.fixed, self.size.preset
 
     @cached_property
     def spec(self) -> Spec:
@@ -113,19 +116,35 @@ class Job:
         points = f"{len(sweep.design)} points x {sweep.seeds_per_part} seeds x {len(sweep.learners)} learners"
         if agents > MOST_AGENTS:
             refuse("points", points, f"at most {MOST_AGENTS} agents at a time, not {agents}")
-        needed = _COPIES * max(  # groups are run one after the other
-            count * sum(agent_bytes(make_learner(n, self.spec, g.config), self.spec, g.config) for n in sweep.learners)
-            for count, g in zip(lanes, self.groups, strict=True)
-        )
-        if needed > (available := physical_memory()):
+        available = physical_memory()
+        if self._needed(lanes, _most_bytes) > available and (needed := self._needed(lanes, agent_bytes)) > available:
             estimate = f"about {needed / 2**30:.3g} GiB for {agents} agents at a time"
             refuse("points", points, f"what fits {available / 2**30:.3g} GiB of memory, not {estimate}")
         _ = self.points
 
+    def _needed(self, lanes: list[int], bytes_of: Callable[[Learner, Spec, Config], int]) -> int:
+        """Bytes for so many lanes of the groups, which are run one after the other."""
+        names, spec = self.sweep.learners, self.spec
+        of_lane = [sum(bytes_of(make_learner(n, spec, g.config), spec, g.config) for n in names) for g in self.groups]
+        return _COPIES * max(count * size for count, size in zip(lanes, of_lane, strict=True))
 
+
+def _most_bytes(learner: Learner, spec: Spec, config: Config) -> int:
+    return sum(most_bytes(learner, spec, config).values())
+
+
+# Unlike a cached property of Python 3.11, a cached function lets other threads ask while it works.
 @functools.lru_cache(maxsize=32)
 def _stacked(environment: str, design: Design, fixed: tuple[tuple[str, float], ...], preset: str) -> Points:
     """The points of equal designs, whose banks of placements take seconds to draw, are made once."""
     base, number = base_of(environment, preset).points, len(design)
     given = [Values(parameter_at(path, base), np.full(number, value)) for path, value in fixed]
     return stacked(base, design.settings(base) + given, number)
+
+
+@functools.lru_cache(maxsize=32)
+def _table(environment: str, design: Design, fixed: tuple[tuple[str, float], ...], preset: str) -> Points:
+    number = len(design)
+    rows = np.minimum(np.arange(max(_LEAST_ROOM, 2 ** (number - 1).bit_length())), number - 1)
+    points = _stacked(environment, design, fixed, preset)
+    return jax.tree.map(lambda leaf: leaf if len(leaf) == 1 else jnp.asarray(np.asarray(leaf)[rows]), points)

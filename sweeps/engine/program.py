@@ -107,8 +107,10 @@ def lanes_of(job: Job, group: Group, seeds: range) -> Lanes:
     """
     shape = (len(group.rows), len(seeds))
     point, seed = (a.reshape(-1) for a in np.indices(shape))
-    keys = keys_of(np.array(seeds)[seed])
-    return Lanes(jax.vmap(target_key)(keys) if job.source else keys, np.array(group.rows)[point], seed, shape)
+    keys = keys_of(np.array(seeds))
+    of_seeds = jax.random.key_data(jax.vmap(target_key)(keys) if job.source else keys)
+    keys = jax.random.wrap_key_data(jnp.asarray(np.asarray(of_seeds)[seed]))
+    return Lanes(keys, np.array(group.rows)[point], seed, shape)
 
 
 def advance(job: Job, seeds: range, source: Source | None) -> Iterator[Chunk]:
@@ -130,9 +132,9 @@ def _advance_group(job: Job, group: Group, lanes: Lanes, source: Source | None) 
     episodes = group.config.episodes
     chunk, points = chunk_of(episodes), job.table  # of all points, so that groups of any number have the same shapes
     program = program_of(job.sweep.learners, job.spec, group.config, chunk)
-    of_lane: Any = jax.tree.map(lambda leaf: leaf[job.source_points[lanes.points], lanes.seeds], source)
-    started = parallel.groups((lanes.keys, of_lane, jnp.asarray(lanes.points)))
-    batches = [(program.start(points, batch), batch[2]) for batch in started]
+    of_lane: Any = jax.tree.map(lambda leaf: np.asarray(leaf)[job.source_points[lanes.points], lanes.seeds], source)
+    started = parallel.groups((lanes.keys, of_lane, lanes.points.astype(np.int32)))
+    batches = [(program.start(points, batch), jnp.asarray(batch[2])) for batch in started]
     del started
     for first in range(0, episodes, chunk):
         advanced = [program.advance((points, jnp.int32(first)), batch) for batch in batches]

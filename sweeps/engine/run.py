@@ -13,6 +13,7 @@ from jrcjax.learners import Source
 from jrcjax.machine import usable_cores
 from sweeps import progress
 from sweeps.engine import estimate, pace
+from sweeps.engine.ahead import Ahead
 from sweeps.engine.block import Block, block_of
 from sweeps.engine.job import Job
 from sweeps.engine.program import Chunk, advance
@@ -58,6 +59,17 @@ def expected_seconds(sweeps: list[Sweep], size: Size, out: Path) -> float:
     return seconds + sum(lacking.values())
 
 
+def compile_ahead(sweeps: list[Sweep], size: Size, out: Path) -> Ahead:
+    """Begins to compile, in threads, what these sweeps lack in `out`, in their order; for `run_sweep`."""
+    jobs: dict[Sweep, tuple[Job, range]] = {}
+    for job in [Job(sweep, size) for sweep in sweeps]:
+        for seeds in to_do(job, out)[:1]:
+            if job.source and (missing := missing_sources(job.source, seeds, out)):
+                jobs.setdefault(job.source.sweep, (job.source, missing))
+            jobs.setdefault(job.sweep, (job, seeds))
+    return Ahead(jobs.values())
+
+
 def run_sweep(
     sweep: Sweep,
     size: Size,
@@ -68,6 +80,7 @@ def run_sweep(
     save_agents: bool = False,
     client: Any = None,
     patience: float = 300.0,
+    ahead: Ahead | None = None,
 ) -> Path:
     """Runs what is missing of a sweep.
 
@@ -80,6 +93,7 @@ def run_sweep(
       save_agents: save the trained agents beside the results.
       client: of the Dask cluster that computes (see `sweeps.engine.distributed`); this process if None.
       patience: seconds to wait for workers of a cluster that has none.
+      ahead: what compiles the sweep's programs already, see `compile_ahead`.
 
     Returns:
       The folder with the results.
@@ -108,7 +122,7 @@ def run_sweep(
     with files.locked(folder):
         try:
             if client is None:
-                _run_here(job, out, console, seconds, save_agents)
+                _run_here(job, out, console, seconds, save_agents, ahead)
             else:
                 _run_on_cluster(client, job, out, console, save_agents, patience)
         except (KeyboardInterrupt, OSError):
@@ -130,8 +144,8 @@ def save(block: Block, job: Job, out: Path, save_agents: bool) -> None:
 class _Shown:
     """Computes blocks while a bar shows how many of the expected seconds are done."""
 
-    def __init__(self, told: Callable[[float], None]):
-        self._told = told
+    def __init__(self, told: Callable[[float], None], ahead: Ahead | None):
+        self._told, self._ahead = told, ahead
         self._compiled = set()
         self.stopwatch = pace.Stopwatch()
 
@@ -141,6 +155,8 @@ class _Shown:
     def _chunks(self, job: Job, seeds: range, source: Source | None) -> Iterator[Chunk]:
         started = set()
         self.stopwatch.start()
+        if self._ahead:
+            self._ahead.wait(job.sweep)
         for chunk in advance(job, seeds, source):
             seconds = chunk.episodes * estimate.seconds_per_episode(job, chunk.group, len(seeds))
             if chunk.group not in started:
@@ -154,10 +170,10 @@ class _Shown:
             self.stopwatch.start()
 
 
-def _run_here(job: Job, out: Path, console: Console, seconds: float, save_agents: bool) -> None:
+def _run_here(job: Job, out: Path, console: Console, seconds: float, save_agents: bool, ahead: Ahead | None) -> None:
     """Runs what is missing, as it is now that nobody else writes, and shows the progress of so many seconds."""
     with progress.shown(console, job.sweep.name, seconds) as told:
-        shown = _Shown(told)
+        shown = _Shown(told, ahead)
         for seeds in to_do(job, out):
             source = sources_of(job.source, seeds, out, shown.compute) if job.source else None
             save(shown.compute(job, seeds, source), job, out, save_agents)

@@ -23,7 +23,7 @@ from sweeps.__main__ import main
 from sweeps.design import Column, Design, along
 from sweeps.engine.job import Job
 from sweeps.engine.program import chunk_of, joined
-from sweeps.engine.run import blocks, expected_seconds, run_sweep
+from sweeps.engine.run import blocks, compile_ahead, expected_seconds, run_sweep
 from sweeps.engine.sources import missing_sources, sources_of
 from sweeps.results import store
 from sweeps.results.configuration import configuration, digest_of
@@ -323,11 +323,17 @@ def test_hyperparameters_of_points_are_part_of_the_configuration():
     assert found["source"] == configuration(Job(SOURCE, TINY))
 
 
-def test_a_transfer_sweep_compiles_once_for_all_blocks(tmp_path):
+def test_a_transfer_sweep_compiles_once_for_all_blocks_and_that_ahead_of_them(tmp_path):
     size = replace(TINY, seeds=2 * FIG5A.seeds_per_part, episodes=1, pretraining=3)
-    with compilations() as compiled:
-        run_sweep(replace(PAIR, learners=("tlwd", "dpr")), size, tmp_path, QUIET, resume=False)
-    # Source agents start, advance and demonstrate; the sweep's agents start and advance.
+    sweep = replace(PAIR, learners=("tlwd", "dpr"))
+    again = replace(sweep, name="again", design=along(_P, _P, (0.2, 0.4, 0.6)))  # a program serves any few points
+    with compilations() as compiled, contextlib.closing(compile_ahead([sweep, again], size, tmp_path)) as ahead:
+        for each in (SOURCE, sweep, again):
+            ahead.wait(each)
+        # Source agents start, advance and demonstrate; the sweep's agents start and advance.
+        assert compiled.count("jit(checked)") == 5
+        for each in (sweep, again):
+            run_sweep(each, size, tmp_path, QUIET, resume=False, ahead=ahead)
     assert compiled.count("jit(checked)") == 5
 
 

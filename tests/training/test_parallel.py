@@ -67,6 +67,16 @@ def test_pad_agents_repeats_the_last():
     assert same.tolist() == [0, 1, 2]
 
 
+@pytest.mark.parametrize("count", [1, UNIT, UNIT + 1])
+def test_groups_are_the_padded_agents_in_their_order(count):
+    agents = {"x": np.arange(count), "key": jax.random.split(jax.random.key(0), count), "nothing": None}
+    groups, padded = parallel.groups(agents), parallel.pad_agents(agents, parallel.padded(count))
+    assert {len(group["x"]) for group in groups} == {parallel.group_size(count)}
+    np.testing.assert_array_equal(np.concatenate([group["x"] for group in groups]), padded["x"])
+    keys = np.concatenate([jax.random.key_data(group["key"]) for group in groups])
+    np.testing.assert_array_equal(keys, jax.random.key_data(padded["key"]))
+
+
 @pytest.mark.parametrize("blocks", [1, 2, 3])
 def test_over_agents_is_a_vmap(blocks):
     def function(shared, agent):
