@@ -67,22 +67,29 @@ def readings_list(published: Path) -> str:
     """In which share of the readings the statements hold, and what decides."""
     claims, sensitivity = (csv_of(published, MULTIVERSE.name, name) for name in ("claims", "sensitivity"))
     number, by_name = int(claims.readings.max()), {row["claim"]: row for row in claims.to_dict("records")}
-    everywhere, nowhere = claims[claims.holds_low > _NEARLY_ALL], claims[claims.holds_high < 1 - _NEARLY_ALL]
     sentences = [
         f"{name} holds in {_holds(by_name[name])}; decided most by {_deciding(sensitivity, name, 2)}." for name in NAMED
     ]
-    sentences += [
-        _together(csv_of(published, MULTIVERSE.name, "verdicts")),
-        f"In more than {percent(_NEARLY_ALL)} of the space, interval included, hold {len(everywhere)} of {len(claims)} "
-        f"statements: {'; '.join(everywhere.claim) or 'none'}.",
-        f"In less than {percent(1 - _NEARLY_ALL)} of it hold {len(nowhere)}: {'; '.join(nowhere.claim) or 'none'}.",
-    ]
+    sentences.append(_together(csv_of(published, MULTIVERSE.name, "verdicts")))
     about = (
         f"Shares of {number} readings ([tables](published/{MULTIVERSE.name})) in which the estimate is on the "
         "statement's side, with 95 %\nintervals, and total-order indices of what decides it; unknown is where no run "
         "converges:\n\n"
     )
     return about + listed(sentences)
+
+
+def extremes_list(published: Path) -> str:
+    """Statements that hold nearly everywhere, and nearly nowhere."""
+    claims = csv_of(published, MULTIVERSE.name, "claims")
+    everywhere, nowhere = claims[claims.holds_low > _NEARLY_ALL], claims[claims.holds_high < 1 - _NEARLY_ALL]
+    return listed(
+        [
+            f"In more than {percent(_NEARLY_ALL)} of the space, interval included, hold {len(everywhere)} of "
+            f"{len(claims)} statements: {'; '.join(everywhere.claim) or 'none'}.",
+            f"In less than {percent(1 - _NEARLY_ALL)} of it hold {len(nowhere)}: {'; '.join(nowhere.claim) or 'none'}.",
+        ]
+    )
 
 
 def _together(verdicts: pd.DataFrame) -> str:
@@ -194,6 +201,7 @@ def short(value: object) -> str:
 
 BLOCKS: dict[str, Callable[[Path], str]] = {
     "readings": readings_list,
+    "extremes": extremes_list,
     "decided": decided_table,
     "questions": questions_table,
     "answers": answers_table,

@@ -86,6 +86,7 @@ def test_shares_and_what_decides_are_those_of_the_tables(published):
     assert "Shares of 400 readings" in text
     assert f"- C3 (TLwD) holds in 50 % (45 to 55), unknown in 30 %; decided most by {STEP} 0.80." in text
     assert "C5 (highest) holds in 50 % (45 to 55); decided most by no single question." in text
+    text = " ".join(readings_text.extremes_list(published).split())
     assert "hold 1 of 7 statements: C2 (everywhere)." in text
     assert "In less than 10 % of it hold 1: C4." in text
 
