@@ -120,7 +120,7 @@ def _run(command: Command) -> int:
     size = size_of(command.seeds, command.episodes, preset, command.smoke, study)
     size.check()
     if command.keep:
-        multiverse.require_summary(command.out)
+        multiverse.require_summary(command.out, size)
     sweeps = study.smoke_sweeps if command.smoke and study.smoke_sweeps else study.sweeps
     require_integer("wait", command.wait, 0)
     options = {"resume": command.resume, "save_agents": command.save_agents, "patience": command.wait}

@@ -6,6 +6,7 @@ added, resumed, or sent to other machines.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -165,7 +166,12 @@ def verdicts_file(out: Path) -> Path:
     return out / MULTIVERSE.name / "summary" / "verdicts.csv"
 
 
-def require_summary(out: Path) -> None:
-    """Raises ValueError naming `keep` unless there is a summary in `out`."""
-    if not verdicts_file(out).is_file():
-        refuse("keep", True, f"where an earlier run left its summary, and {verdicts_file(out)} is missing")
+def require_summary(out: Path, size: Size) -> None:
+    """Raises ValueError naming `keep` or `episodes` unless there is a summary of runs of this length in `out`."""
+    path = verdicts_file(out)
+    if not path.is_file():
+        refuse("keep", True, f"where an earlier run left its summary, and {path} is missing")
+    manifests = json.loads((path.parent / "manifests.json").read_text(encoding="utf-8"))
+    kept = {manifest["configuration"]["episodes"] for manifest in manifests.values()}
+    if kept - {size.episodes}:
+        refuse("episodes", size.episodes, f"{', '.join(map(str, sorted(kept)))}, as in the summary that is kept")

@@ -177,6 +177,15 @@ def test_bad_options_are_refused(flags, message, tmp_path, capsys):
     assert not any(tmp_path.iterdir())
 
 
+def test_readings_of_another_length_are_not_added(made_up, tmp_path, capsys):
+    made_up("out", 2)
+    path = tmp_path / "out" / "multiverse" / "summary" / "manifests.json"
+    path.write_text(json.dumps({"multiverse/000000-000001": {"configuration": {"episodes": 450}}}))
+    run = ["run", "multiverse", "--keep", "--readings", "2", "--episodes", "20", "--out", str(tmp_path / "out")]
+    assert main(run) == 2
+    assert "episodes: 20; allowed: 450, as in the summary that is kept" in capsys.readouterr().err
+
+
 def test_the_default_has_a_place_in_the_space():
     base = base_of("target", "paper")
     for path, value in values_at(default_unit()).items():
