@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -72,7 +73,9 @@ def make_figures(
     folder = results_folder(out, size)
     sweeps = [SWEEPS[figure.name] for figure in wanted]
     written, results, slots = _Written(), {}, slots_of(size.preset)
-    with contextlib.closing(compile_ahead(sweeps, size, folder)) as ahead:
+    drawn: list[Future] = []
+    # A single thread draws, since matplotlib's settings are global, while the next figure's sweep runs.
+    with ThreadPoolExecutor(1, "drawing") as drawing, contextlib.closing(compile_ahead(sweeps, size, folder)) as ahead:
         seconds = expected_seconds(sweeps, size, folder)
         console.print(
             f"figures: {len(wanted)}, seeds: {size.seeds}, episodes: {size.episodes}; "
@@ -81,10 +84,12 @@ def make_figures(
         for figure in wanted:
             found = run_sweep(SWEEPS[figure.name], size, folder, console, resume=True, ahead=ahead)
             results[figure.name] = store.load(found, size.seeds)
-            _write_figure(figure, results[figure.name], slots, out, written)
+            drawn.append(drawing.submit(_write_figure, figure, results[figure.name], slots, out, written))
             written.manifests[figure.name] = (found / store.MANIFEST).read_text(encoding="utf-8")
-    if "fig5b" in results:
-        _write_front(results["fig5b"], size, out, written)
+            if figure.name == "fig5b":
+                drawn.append(drawing.submit(_write_front, results[figure.name], size, out, written))
+        for each in drawn:
+            each.result()
     _write_tables(results, slots, out, written)
     _write_verdicts(results, rules, size, out, written)
     return written.files
