@@ -48,26 +48,28 @@ def to_do(job: Job, out: Path) -> list[range]:
     return list(blocks(job.size.seeds, store.finished_seeds(folder), job.sweep.seeds_per_part))
 
 
-def expected_seconds(sweeps: list[Sweep], size: Size, out: Path) -> float:
-    """What these sweeps will take, with the source agents that they lack, as far as one can tell beforehand."""
-    seconds, lacking = 0.0, {}
+def lacking(sweeps: list[Sweep], size: Size, out: Path) -> list[tuple[Job, range]]:
+    """Blocks that these sweeps lack in `out`, as they are run, each behind the source agents that it lacks."""
+    found: dict[tuple[Sweep, range], Job] = {}
     for job in [Job(sweep, size) for sweep in sweeps]:
         for seeds in to_do(job, out):
-            seconds += estimate.block_seconds(job, len(seeds))
             if job.source and (missing := missing_sources(job.source, seeds, out)):
-                lacking[job.source.sweep, missing] = estimate.block_seconds(job.source, len(missing))
-    return seconds + sum(lacking.values())
+                found.setdefault((job.source.sweep, missing), job.source)
+            found[job.sweep, seeds] = job
+    return [(job, seeds) for (_, seeds), job in found.items()]
+
+
+def expected_seconds(sweeps: list[Sweep], size: Size, out: Path) -> float:
+    """What these sweeps will take, with the source agents that they lack, as far as one can tell beforehand."""
+    return sum(estimate.block_seconds(job, len(seeds)) for job, seeds in lacking(sweeps, size, out))
 
 
 def compile_ahead(sweeps: list[Sweep], size: Size, out: Path) -> Ahead:
     """Begins to compile, in threads, what these sweeps lack in `out`, in their order; for `run_sweep`."""
-    jobs: dict[Sweep, tuple[Job, range]] = {}
-    for job in [Job(sweep, size) for sweep in sweeps]:
-        for seeds in to_do(job, out)[:1]:
-            if job.source and (missing := missing_sources(job.source, seeds, out)):
-                jobs.setdefault(job.source.sweep, (job.source, missing))
-            jobs.setdefault(job.sweep, (job, seeds))
-    return Ahead(jobs.values())
+    first: dict[Sweep, tuple[Job, range]] = {}
+    for job, seeds in lacking(sweeps, size, out):
+        first.setdefault(job.sweep, (job, seeds))
+    return Ahead(first.values())
 
 
 def run_sweep(
