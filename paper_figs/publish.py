@@ -26,8 +26,7 @@ from paper_figs.numbers import numbers_of
 from paper_figs.pipeline import results_folder
 from paper_figs.readings_text import HUBER
 from paper_figs.readme import renewed
-from paper_figs.reconstruction_text import BEST
-from paper_figs.studies.reconstruction import PRESET
+from paper_figs.studies.reconstruction import BEST, PRESET_FILE
 from sweeps.options import FLAGS, Folder
 from sweeps.preset import preset_of
 from sweeps.results import store
@@ -142,9 +141,9 @@ def main(args: list[str] | None = None) -> int:
             if summary := getattr(options, name):
                 written.append(publish_study(summary, root / "published" / name))
         if options.reconstruction:
-            written.append(publish_preset(options.reconstruction / PRESET, root / "sweeps" / "presets"))
+            written.append(publish_preset(options.reconstruction / PRESET_FILE, root / "sweeps" / "presets"))
         if options.best:
-            preset = preset_of(str(root / "sweeps" / "presets" / PRESET))
+            preset = preset_of(str(root / "sweeps" / "presets" / PRESET_FILE))
             written += publish_figures(options.best, root / "published" / BEST, preset)
         if options.huber:
             written += publish_sweep(options.huber, root / "published" / HUBER)

@@ -17,9 +17,6 @@ from paper_figs.studies.reconstruction import ALL
 from sweeps.studies.readings import READINGS
 from sweeps.studies.reconstruction import NAME
 
-BEST = "best"
-"""The published figures in the best reading that the search found, and its name as a preset."""
-
 
 def _tables(published: Path) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
     tried, confirmed, closest = (csv_of(published, NAME, name) for name in ("tried", "confirmed", "closest"))

@@ -29,8 +29,9 @@ from sweeps.studies.readings import PER_BLOCK, READINGS, as_text, default_unit, 
 from sweeps.studies.reconstruction import NAME, Effort, confirmation_sweep, generation_sweep, of_seeds
 from sweeps.sweep import Size, Sweep
 
-PRESET = "best.toml"
-"""The best reading, for --preset."""
+BEST = "best"
+"""The best reading's name as a preset; the summary holds it as a file."""
+PRESET_FILE = f"{BEST}.toml"
 _SIGMA = 0.25  # of the first generation, in the unit cube
 _STATIC = np.array([is_static(reading) for reading in READINGS])
 _LEVELS = np.array([len(range_of(reading).levels) for reading in READINGS])
@@ -200,7 +201,7 @@ def _write(folder: Path, tried: list[Tried], chosen: list[Choice], confirmed: li
     preset = preset_text({}, {path: as_text(path, value) for path, value in values_at(best.unit).items()})
     return [
         *(style.save_table(table, folder / f"{name}.csv") for name, table in tables.items()),
-        write_text(folder / PRESET, preset),
+        write_text(folder / PRESET_FILE, preset),
         *style.save(plot.draw_search(tables["tried"], tables["confirmed"]), folder / NAME),
     ]
 

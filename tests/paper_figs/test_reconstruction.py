@@ -82,7 +82,7 @@ def test_the_search_finds_the_reading_and_confirms_it_with_other_seeds(small_ste
     best = confirmed[confirmed.best_for.str.contains("all")]
     assert best.promised[1:2].all()
     assert not best.holds[:2].any()  # what the search promised and fresh seeds did not give
-    preset = preset_of(str(summary / reconstruction.PRESET))
+    preset = preset_of(str(summary / reconstruction.PRESET_FILE))
     rate = float(base_of("target", preset).points.hparams.learning_rate)
     assert rate == pytest.approx(tried["hparams.learning_rate"][tried.agreement.argmax()], rel=1e-5)
 
@@ -241,5 +241,5 @@ def test_the_usual_effort():
 def test_a_tiny_search_runs_from_the_command_to_a_preset(tmp_path):
     run = ["run", "reconstruction", "--smoke", "--episodes", "1", "--out", str(tmp_path)]
     assert main(run) == 0
-    preset_of(str(tmp_path / "reconstruction" / "summary" / reconstruction.PRESET))
+    preset_of(str(tmp_path / "reconstruction" / "summary" / reconstruction.PRESET_FILE))
     assert main([*run, "--resume"]) == 0
