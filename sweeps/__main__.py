@@ -55,7 +55,7 @@ class Run:
     wait: Annotated[int, tyro.conf.arg(metavar="SECONDS")] = 300
     """How long to wait for workers of a cluster that has none."""
     readings: Count = None
-    """Of the multiverse and of the reconstruction, how many readings of the paper. Default: 512 and 336, or 2 and 4
+    """Of the multiverse and of the reconstruction, how many readings of the paper. Default: 512 and 304, or 2 and 4
     with --smoke."""
     first: int = 0
     """Of the multiverse, the first reading to run, a multiple of 64."""

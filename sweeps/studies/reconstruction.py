@@ -26,7 +26,7 @@ _MOST = 2**20
 class Effort:
     """How much to search and to confirm."""
 
-    readings: int = 336
+    readings: int = 304
     """Readings that are tried."""
     confirm: int = 100
     """Fresh seeds of each reading that is confirmed; those of the search count nowhere else."""

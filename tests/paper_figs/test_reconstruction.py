@@ -234,7 +234,7 @@ def test_bad_efforts_are_refused(flags, message, tmp_path, capsys):
 
 
 def test_the_usual_effort():
-    assert effort_of(None, None, smoke=False) == Effort(336, 100, 3, 16)
+    assert effort_of(None, None, smoke=False) == Effort(304, 100, 3, 16)
 
 
 @pytest.mark.slow
