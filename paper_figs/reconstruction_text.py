@@ -13,13 +13,18 @@ from paper_figs.analysis.intervals import proportion_effect
 from paper_figs.claims.table import number_of
 from paper_figs.markdown import listed, percent, table
 from paper_figs.readings_text import csv_of, short
-from paper_figs.studies.reconstruction import ALL
+from paper_figs.studies import multiverse
+from paper_figs.studies.reconstruction import ALL, DEFAULT
 from sweeps.studies.readings import READINGS
 from sweeps.studies.reconstruction import NAME
+
+_PAGE = "docs/explanation/readings.md#the-reading-in-which-most-of-the-text-holds"
 
 
 def _tables(published: Path) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
     tried, confirmed, closest = (csv_of(published, NAME, name) for name in ("tried", "confirmed", "closest"))
+    if DEFAULT not in set(tried.reading):
+        raise ValueError(f"{NAME}: no reading {DEFAULT!r} among those tried; search from a multiverse's summary")
     return tried, confirmed.assign(number=confirmed.claim.map(number_of)), closest
 
 
@@ -28,23 +33,43 @@ def _for(confirmed: pd.DataFrame, what: str) -> pd.DataFrame:
     return confirmed.loc[[what in best_for.split() for best_for in confirmed.best_for]]
 
 
+def _searched(tried: pd.DataFrame) -> int:
+    """How many of the readings the search proposed."""
+    return int(tried.reading.str.startswith("search").sum())
+
+
+def _nowhere(tried: pd.DataFrame, closest: pd.DataFrame) -> tuple[pd.DataFrame, float]:
+    """What holds in no reading, and the largest share of the space that readings drawn from it leave to that."""
+    most = float(proportion_effect(0, len(tried) - _searched(tried)).high)
+    return closest.loc[closest.holds == 0], most
+
+
+def search_list(published: Path) -> str:
+    """How far the best reading goes, and what holds in none, in two sentences."""
+    tried, confirmed, closest = _tables(published)
+    best, (nowhere, most) = _for(confirmed, ALL), _nowhere(tried, closest)
+    name, agreement = best.reading.iloc[0], tried.set_index("reading").agreement
+    sentences = [
+        f"Of {len(tried)} readings, {_searched(tried)} of them proposed by a search for the one that agrees most with "
+        f"the text, {name} is the best: of a claim's statements {percent(multiverse.agreement(best).mean())} hold in "
+        f"it by {int(best.n_seeds.max())} fresh seeds, on average over the claims (promised by one seed: "
+        f"{percent(agreement[name])}; default: {percent(agreement[DEFAULT])}); [what holds in it]({_PAGE}).",
+        f"In none of these readings, so in at most {percent(most)} of the space, holds {_names(nowhere.claim)}.",
+    ]
+    return listed(sentences)
+
+
 def best_list(published: Path) -> str:
     """What the best reading promised and fresh seeds gave, and what was found nowhere."""
     tried, confirmed, closest = _tables(published)
-    best = _for(confirmed, ALL)
-    name, seeds = best.reading.iloc[0], int(best.n_seeds.max())
+    best, (nowhere, most) = _for(confirmed, ALL), _nowhere(tried, closest)
+    name, seeds, searched = best.reading.iloc[0], int(best.n_seeds.max()), _searched(tried)
     agreement = tried.set_index("reading").agreement
-    searched, nowhere = int(tried.reading.str.startswith("search").sum()), closest.loc[closest.holds == 0]
-    most = float(proportion_effect(0, len(tried) - searched).high)
     sentences = [
         f"Of {len(tried)} readings, {searched} of them proposed by the search, {name} agrees best with the text: "
-        f"the search promised {int(best.promised.sum())} of {len(best)} statements"
-        + (
-            f" (agreement {percent(agreement[name])}, default {percent(agreement['default'])})"
-            if "default" in agreement
-            else ""
-        )
-        + f", and {seeds} fresh seeds gave {int(best.holds.sum())}: {_count(best)}.",
+        f"the search promised {int(best.promised.sum())} of {len(best)} statements (agreement "
+        f"{percent(agreement[name])}, default {percent(agreement[DEFAULT])}), and {seeds} fresh seeds gave "
+        f"{int(best.holds.sum())} (agreement {percent(multiverse.agreement(best).mean())}): {_count(best)}.",
         f"Beyond that reading, which is the best for all claims together, fresh seeds in the best reading for each "
         f"claim support: {_names(_supported_beyond(confirmed, best))}.",
         f"On their side in none of the {len(tried)} readings, so in at most {percent(most)} of the space: "
@@ -83,7 +108,7 @@ def best_values_table(published: Path) -> str:
     tried, confirmed, _ = _tables(published)
     by_name = tried.set_index("reading")
     best = by_name.loc[_for(confirmed, ALL).reading.iloc[0]]
-    rows = [(f"`{r.path}`", r.label, short(by_name[r.path].get("default", "")), short(best[r.path])) for r in READINGS]
+    rows = [(f"`{r.path}`", r.label, short(by_name[r.path].get(DEFAULT, "")), short(best[r.path])) for r in READINGS]
     return table(("field", "question", "default", "best reading"), rows)
 
 
@@ -115,6 +140,7 @@ def _side_by_side(row: Mapping[Hashable, Any]) -> str:
 
 
 BLOCKS: dict[str, Callable[[Path], str]] = {
+    "search": search_list,
     "best": best_list,
     "best_values": best_values_table,
     "confirmed": confirmed_table,

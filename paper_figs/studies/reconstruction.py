@@ -35,7 +35,8 @@ PRESET_FILE = f"{BEST}.toml"
 _SIGMA = 0.25  # of the first generation, in the unit cube
 _STATIC = np.array([is_static(reading) for reading in READINGS])
 _LEVELS = np.array([len(range_of(reading).levels) for reading in READINGS])
-_DEFAULT = "default"
+DEFAULT = "default"
+"""Name of the first reading of a multiverse."""
 ALL = "all"
 """What the reading is the best for that agrees most with all claims together."""
 
@@ -144,7 +145,7 @@ def _of_multiverse(out: Path) -> list[Tried]:
         return []
     readings = pd.read_csv(path, keep_default_na=True).groupby("reading")
     return [
-        Tried(f"multiverse {n}" if n else _DEFAULT, unit_of(1, int(n))[0] if n else default_unit(), of)  # pyright: ignore
+        Tried(f"multiverse {n}" if n else DEFAULT, unit_of(1, int(n))[0] if n else default_unit(), of)  # pyright: ignore
         for n, of in readings
     ]
 

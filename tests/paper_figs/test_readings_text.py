@@ -127,11 +127,18 @@ def test_a_statement_holds_by_the_answers_that_decide_it(published):
 def test_promise_and_confirmation_stand_side_by_side(published):
     text = " ".join(reconstruction_text.best_list(published).split())
     assert "Of 4 readings, 2 of them proposed by the search, search 0 agrees best with the text" in text
-    assert "promised 3 of 4 statements (agreement 60 %, default 20 %), and 100 fresh seeds gave 1:" in text
-    assert ": 1 supported, 2 contradicted, 1 undecided." in text
+    assert (
+        "promised 3 of 4 statements (agreement 60 %, default 20 %), and 100 fresh seeds gave 1 (agreement 25 %):"
+        in text
+    )
     assert "in the best reading for each claim support: C5 (highest)." in text
     assert "in none of the 4 readings, so in at most 77.6 % of the space: C11." in text  # 1 - 0.05 ** (1 / 2)
     assert "nor in that for their claim: C4." in text
+    first_page = " ".join(reconstruction_text.search_list(published).split())
+    assert "Of 4 readings, 2 of them proposed by a search" in first_page
+    assert "search 0 is the best: of a claim's statements 25 % hold in it by 100 fresh seeds" in first_page
+    assert "(promised by one seed: 60 %; default: 20 %)" in first_page
+    assert "In none of these readings, so in at most 77.6 % of the space, holds C11." in first_page
     rows = reconstruction_text.confirmed_table(published).splitlines()[2:]
     assert (
         "| C5 (highest) | 2 of 4 | 1, 0.5 (0.4 to 0.6): contradicted | search 1 | 1, 2 (1.5 to 2.5): supported |"
@@ -141,6 +148,13 @@ def test_promise_and_confirmation_stand_side_by_side(published):
     values = reconstruction_text.best_values_table(published).splitlines()[2:]
     assert len(values) == len(READINGS)
     assert f"| `{READINGS[0].path}` | {STEP} | 0.5 | 0.25 |" in values
+
+
+def test_a_search_that_began_without_a_multiverse_has_no_default_to_stand_beside(published):
+    path = published / "reconstruction" / "tried.csv"
+    path.write_text("\n".join(line for line in path.read_text().splitlines() if not line.startswith("default")))
+    with pytest.raises(ValueError, match="no reading 'default' among those tried"):
+        reconstruction_text.best_list(published)
 
 
 def test_what_the_loss_does_is_what_the_table_holds(published):
