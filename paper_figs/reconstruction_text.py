@@ -70,11 +70,15 @@ def best_list(published: Path) -> str:
         f"the search promised {int(best.promised.sum())} of {len(best)} statements (agreement "
         f"{percent(agreement[name])}, default {percent(agreement[DEFAULT])}), and {seeds} fresh seeds gave "
         f"{int(best.holds.sum())} (agreement {percent(multiverse.agreement(best).mean())}): {_count(best)}.",
-        f"Beyond that reading, which is the best for all claims together, fresh seeds in the best reading for each "
-        f"claim support: {_names(_supported_beyond(confirmed, best))}.",
         f"On their side in none of the {len(tried)} readings, so in at most {percent(most)} of the space: "
         f"{_names(nowhere.claim)}.",
-        f"On their side in some of them, and supported by fresh seeds neither in the best reading for all nor in that "
+    ]
+    if to_come := [number for number in confirmed.number.unique() if _for(confirmed, number).empty]:
+        return listed([*sentences, f"Fresh seeds in the best readings for {', '.join(to_come)} are still to come."])
+    sentences += [
+        f"Beyond that reading, which is the best for all claims together, fresh seeds in the best reading for each "
+        f"claim support: {_names(_supported_beyond(confirmed, best))}.",
+        f"On their side in some readings, and supported by fresh seeds neither in the best reading for all nor in that "
         f"for their claim: {_names(_unconfirmed(confirmed, nowhere))}.",
     ]
     return listed(sentences)
@@ -122,8 +126,8 @@ def confirmed_table(published: Path) -> str:
         for what in (ALL, number_of(str(row["claim"]))):
             of_reading = _for(of_claim, what).to_dict("records")
             cells.append(_side_by_side(of_reading[0]) if of_reading else "")
-        reading = _for(of_claim, number_of(str(row["claim"]))).reading
-        rows.append((str(row["claim"]), f"{row['holds']} of {row['tried']}", cells[0], *reading.iloc[:1], cells[1]))
+        reading = next(iter(_for(of_claim, number_of(str(row["claim"]))).reading), "to come")
+        rows.append((str(row["claim"]), f"{row['holds']} of {row['tried']}", cells[0], reading, cells[1]))
     head = (
         "statement",
         "on its side in",

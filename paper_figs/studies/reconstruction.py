@@ -82,11 +82,13 @@ def search(effort: Effort, size: Size, out: Path, run: Callable[..., Path]) -> l
         optimiser.tell([one.agreement for one in generation])
         found += generation
     chosen, fresh = choice_of(known + found), of_seeds(size, size.seeds + effort.confirm)
-    confirmed = []
+    confirmed, written = [], []
     for choice in chosen:
         sweep = confirmation_sweep(choice.reading.unit, choice.figures)
         confirmed += _kept(sweep, fresh, out, run, first_seed=size.seeds)
-    return _write(out / NAME / "summary", known + found, chosen, confirmed)
+        # Each reading takes long, so the summary says what is confirmed so far.
+        written = _write(out / NAME / "summary", known + found, chosen[: len(confirmed)], confirmed)
+    return written
 
 
 class Choice(NamedTuple):

@@ -44,10 +44,10 @@ def published(tmp_path):
         return row | {"n_seeds": 100, "holds": verdict == "supported"}
 
     confirmed = [
-        seen("search 0", "all C3 C11", "C3 (TLwD)", True, 2.0, 1.0, 3.0, "supported"),
-        seen("search 0", "all C3 C11", "C4", True, 0.5, 0.4, 0.6, "contradicted"),
-        seen("search 0", "all C3 C11", "C5 (highest)", True, 0.5, 0.4, 0.6, "contradicted"),
-        seen("search 0", "all C3 C11", "C11", False, -1.0, -2.0, 0.0, "undecided"),
+        seen("search 0", "all C3 C4 C11", "C3 (TLwD)", True, 2.0, 1.0, 3.0, "supported"),
+        seen("search 0", "all C3 C4 C11", "C4", True, 0.5, 0.4, 0.6, "contradicted"),
+        seen("search 0", "all C3 C4 C11", "C5 (highest)", True, 0.5, 0.4, 0.6, "contradicted"),
+        seen("search 0", "all C3 C4 C11", "C11", False, -1.0, -2.0, 0.0, "undecided"),
         seen("search 1", "C5", "C5 (highest)", True, 2.0, 1.5, 2.5, "supported"),
     ]
     holds = {"C3 (TLwD)": 3, "C4": 1, "C5 (highest)": 2, "C11": 0}
@@ -148,6 +148,17 @@ def test_promise_and_confirmation_stand_side_by_side(published):
     values = reconstruction_text.best_values_table(published).splitlines()[2:]
     assert len(values) == len(READINGS)
     assert f"| `{READINGS[0].path}` | {STEP} | 0.5 | 0.25 |" in values
+
+
+def test_what_is_not_yet_run_with_fresh_seeds_is_said(published):
+    path = published / "reconstruction" / "confirmed.csv"
+    confirmed = pd.read_csv(path)
+    confirmed[confirmed.best_for != "C5"].to_csv(path, index=False)
+    text = " ".join(reconstruction_text.best_list(published).split())
+    assert "Fresh seeds in the best readings for C5 are still to come." in text
+    assert "support:" not in text
+    rows = reconstruction_text.confirmed_table(published).splitlines()[2:]
+    assert "| C5 (highest) | 2 of 4 | 1, 0.5 (0.4 to 0.6): contradicted | to come |  |" in rows
 
 
 def test_a_search_that_began_without_a_multiverse_has_no_default_to_stand_beside(published):
