@@ -118,6 +118,25 @@ def test_a_search_goes_on_from_the_verdicts_that_it_kept(small_steps_only, tmp_p
     ]
 
 
+def test_a_search_that_is_stopped_says_what_is_confirmed_so_far(small_steps_only, tmp_path, monkeypatch):
+    def two_of(tried):
+        return [reconstruction.Choice(tried[0], (reconstruction.ALL,)), reconstruction.Choice(tried[1], ("C5",))]
+
+    def run(sweep, size=SIZE):
+        ran.append(size.seeds)
+        if ran.count(9) == 2:
+            raise KeyboardInterrupt
+
+    ran = []
+    monkeypatch.setattr(reconstruction, "choice_of", two_of)
+    with pytest.raises(KeyboardInterrupt):
+        reconstruction.search(Effort(readings=16, confirm=7, starts=1, per_generation=16), SIZE, tmp_path, run)
+    summary = tmp_path / "reconstruction" / "summary"
+    assert set(pd.read_csv(summary / "confirmed.csv").best_for) == {"all"}
+    assert len(pd.read_csv(summary / "tried.csv")) == 16
+    assert (summary / reconstruction.PRESET_FILE).is_file()
+
+
 def test_what_decides_code_stays_as_it_is_at_the_start():
     optimiser = reconstruction._Optimiser(unit_of(1, PER_BLOCK)[0], 8, seed=0)
     start = values_at(unit_of(1, PER_BLOCK)[0])
