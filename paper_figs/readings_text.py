@@ -20,7 +20,7 @@ from sweeps.preset import SOURCES
 from sweeps.studies.multiverse import MULTIVERSE
 from sweeps.studies.readings import READINGS, SOURCE, Reading, as_text, choices, default_unit, range_of, values_at
 
-NAMED = ("C3 (TLwD)", "C5 (highest)", "C8 (miss detection, DDQN)", "C13 (highest)", "C15 (episodes)")
+NAMED = ("C3 (TLwD)", "C5 (highest)", "C8 (miss detection, DDQN)", "C13 (highest)")
 """Statements that the first page names."""
 HUBER = "huber"
 """The published sweep of the Huber loss."""
@@ -195,8 +195,10 @@ def huber_list(published: Path) -> str:
 
 
 def short(value: object) -> str:
-    """A name, or a number with three digits."""
-    return value if isinstance(value, str) else f"{value:.3g}"
+    """A name, or a number with three digits, those before the point at least."""
+    if not isinstance(value, int | float):
+        return str(value)
+    return f"{value:.0f}" if abs(value) >= 1000 else f"{value:.3g}"
 
 
 BLOCKS: dict[str, Callable[[Path], str]] = {

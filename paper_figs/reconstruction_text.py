@@ -10,14 +10,18 @@ import numpy as np
 import pandas as pd
 
 from paper_figs.analysis.intervals import proportion_effect
+from paper_figs.claims import words
+from paper_figs.claims.learning_table import LABELS
 from paper_figs.claims.table import number_of
 from paper_figs.markdown import listed, percent, table
-from paper_figs.readings_text import csv_of, short
+from paper_figs.readings_text import NAMED, csv_of, short
 from paper_figs.studies import multiverse
 from paper_figs.studies.reconstruction import ALL, DEFAULT
-from sweeps.studies.readings import READINGS
+from sweeps.studies.readings import READINGS, SOURCE
 from sweeps.studies.reconstruction import NAME
 
+_RARE = 0.05
+_CONVERGING = ("tlwd", "dpr", "ddqn")
 _PAGE = "docs/explanation/readings.md#the-reading-in-which-most-of-the-text-holds"
 
 
@@ -38,23 +42,46 @@ def _searched(tried: pd.DataFrame) -> int:
     return int(tried.reading.str.startswith("search").sum())
 
 
-def _nowhere(tried: pd.DataFrame, closest: pd.DataFrame) -> tuple[pd.DataFrame, float]:
-    """What holds in no reading, and the largest share of the space that readings drawn from it leave to that."""
+def _nowhere(tried: pd.DataFrame, closest: pd.DataFrame) -> str:
+    """What holds in no reading, with the largest share of the space that readings drawn from it leave to that."""
+    claims = closest.claim[closest.holds == 0]
     most = float(proportion_effect(0, len(tried) - _searched(tried)).high)
-    return closest.loc[closest.holds == 0], most
+    if claims.empty:
+        return ""
+    share = f"in none of the {len(tried)} readings, so in at most {percent(most)} of the space"
+    return f"On their side {share}: {_names(claims)}."
+
+
+def _named(reading: str) -> str:
+    """A reading as sentences name it: "reading 17 of the multiverse", or "the default"."""
+    study, _, number = reading.rpartition(" ")
+    return f"reading {number} of the {study}" if study else f"the {reading}"
+
+
+def _pair(values: pd.Series) -> str:
+    """Whether a reading has the two answers that decide most."""
+    has = int(values["hparams.loss"] == "huber") + int(values[SOURCE] == "table1")
+    return f"It has {('neither', 'one', 'both')[has]} of the Huber loss in the target and Table I's source."
+
+
+def _converged(best: pd.DataFrame) -> str:
+    """When the learners converge in the best reading."""
+    rows = {row["claim"]: row for row in best.to_dict("records")}
+    when = ", ".join(f"{LABELS[name]} {words.number(rows[f'C7 ({LABELS[name]})']['value'])}" for name in _CONVERGING)
+    return f"In it policies converge at p_1^v = 0.8 in episode (median): {when}."
 
 
 def search_list(published: Path) -> str:
     """How far the best reading goes, and what holds in none, in two sentences."""
     tried, confirmed, closest = _tables(published)
-    best, (nowhere, most) = _for(confirmed, ALL), _nowhere(tried, closest)
-    name, agreement = best.reading.iloc[0], tried.set_index("reading").agreement
+    best, rarest = _for(confirmed, ALL), closest.nsmallest(1, "holds").to_dict("records")[0]
+    headlines = best[best.claim.isin(NAMED)].groupby("verdict", sort=False).claim.agg(", ".join)
     sentences = [
-        f"Of {len(tried)} readings, {_searched(tried)} of them proposed by a search for the one that agrees most with "
-        f"the text, {name} is the best: of a claim's statements {percent(multiverse.agreement(best).mean())} hold in "
-        f"it by {int(best.n_seeds.max())} fresh seeds, on average over the claims (promised by one seed: "
-        f"{percent(agreement[name])}; default: {percent(agreement[DEFAULT])}); [what holds in it]({_PAGE}).",
-        f"In none of these readings, so in at most {percent(most)} of the space, holds {_names(nowhere.claim)}.",
+        f"Of {len(tried)} readings, {_searched(tried)} of them proposed by a search, {_named(best.reading.iloc[0])} "
+        f"agrees best with the text: of {len(best)} statements {_count(best)} by {int(best.n_seeds.max())} fresh seeds "
+        f"([all]({_PAGE})), {'; '.join(f'{claims} {verdict}' for verdict, claims in headlines.items())} among them.",
+        _nowhere(tried, closest)
+        or f"By its estimate each statement holds in some reading; {rarest['claim']} in {rarest['holds']} only.",
     ]
     return listed(sentences)
 
@@ -62,16 +89,18 @@ def search_list(published: Path) -> str:
 def best_list(published: Path) -> str:
     """What the best reading promised and fresh seeds gave, and what was found nowhere."""
     tried, confirmed, closest = _tables(published)
-    best, (nowhere, most) = _for(confirmed, ALL), _nowhere(tried, closest)
-    name, seeds, searched = best.reading.iloc[0], int(best.n_seeds.max()), _searched(tried)
+    best, name = _for(confirmed, ALL), _for(confirmed, ALL).reading.iloc[0]
+    rare = closest.loc[(closest.holds > 0) & (closest.holds < _RARE * len(tried))]
     agreement = tried.set_index("reading").agreement
     sentences = [
-        f"Of {len(tried)} readings, {searched} of them proposed by the search, {name} agrees best with the text: "
-        f"the search promised {int(best.promised.sum())} of {len(best)} statements (agreement "
-        f"{percent(agreement[name])}, default {percent(agreement[DEFAULT])}), and {seeds} fresh seeds gave "
-        f"{int(best.holds.sum())} (agreement {percent(multiverse.agreement(best).mean())}): {_count(best)}.",
-        f"On their side in none of the {len(tried)} readings, so in at most {percent(most)} of the space: "
-        f"{_names(nowhere.claim)}.",
+        f"Of {len(tried)} readings, {_searched(tried)} of them proposed by the search, {_named(name)} agrees best with "
+        f"the text: its single seed promised {int(best.promised.sum())} of {len(best)} statements (agreement "
+        f"{percent(agreement[name])}, default {percent(agreement[DEFAULT])}), and {int(best.n_seeds.max())} fresh "
+        f"seeds gave {int(best.holds.sum())} (agreement {percent(multiverse.agreement(best).mean())}): {_count(best)}.",
+        _pair(tried.set_index("reading").loc[name]),
+        _converged(best),
+        _nowhere(tried, closest) or f"Each statement's estimate is on its side in some of the {len(tried)} readings.",
+        f"In less than {percent(_RARE)} of them: {_names(rare.claim)}.",
     ]
     if to_come := [number for number in confirmed.number.unique() if _for(confirmed, number).empty]:
         return listed([*sentences, f"Fresh seeds in the best readings for {', '.join(to_come)} are still to come."])
@@ -79,7 +108,7 @@ def best_list(published: Path) -> str:
         f"Beyond that reading, which is the best for all claims together, fresh seeds in the best reading for each "
         f"claim support: {_names(_supported_beyond(confirmed, best))}.",
         f"On their side in some readings, and supported by fresh seeds neither in the best reading for all nor in that "
-        f"for their claim: {_names(_unconfirmed(confirmed, nowhere))}.",
+        f"for their claim: {_names(_unconfirmed(confirmed, closest))}.",
     ]
     return listed(sentences)
 
@@ -102,8 +131,8 @@ def _supported_beyond(confirmed: pd.DataFrame, best: pd.DataFrame) -> list[str]:
     return [claim for claim in confirmed.claim.unique() if claim in found]
 
 
-def _unconfirmed(confirmed: pd.DataFrame, nowhere: pd.DataFrame) -> list[str]:
-    known = _supported(confirmed) | set(nowhere.claim)
+def _unconfirmed(confirmed: pd.DataFrame, closest: pd.DataFrame) -> list[str]:
+    known = _supported(confirmed) | set(closest.claim[closest.holds == 0])
     return [claim for claim in confirmed.claim.unique() if claim not in known]
 
 
@@ -139,8 +168,9 @@ def confirmed_table(published: Path) -> str:
 
 
 def _side_by_side(row: Mapping[Hashable, Any]) -> str:
-    interval = f" ({row['ci_low']:.3g} to {row['ci_high']:.3g})" if np.isfinite(row["ci_low"]) else ""
-    return f"{row['promised_value']:.3g}, {row['value']:.3g}{interval}: {row['verdict']}"
+    promised, value, low, high = (words.number(float(row[n])) for n in ("promised_value", "value", "ci_low", "ci_high"))
+    interval = "" if np.isnan(row["ci_low"]) else f" ({low} to {high})"
+    return f"{promised}, {value}{interval}: {row['verdict']}"
 
 
 BLOCKS: dict[str, Callable[[Path], str]] = {

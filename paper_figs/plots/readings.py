@@ -137,13 +137,13 @@ def draw_search(tried: pd.DataFrame, confirmed: pd.DataFrame) -> Figure:
         way.axhline(100 * default.agreement.iloc[0], color=_ORANGE, linestyle=":", label="default")
     way.set_xlabel("readings tried")
     way.set_ylabel("agreement with the text (%)")
-    way.legend(fontsize=6)
+    way.legend(fontsize=6, ncol=2, loc="lower center", bbox_to_anchor=(0.5, 1.0))
     best = confirmed.loc[[("all" in what.split()) for what in confirmed.best_for]]
     number = np.array([claim.split(" ")[0] for claim in best.claim])
     seeds = int(best.n_seeds.max())
     places = {name: place for place, name in enumerate(dict.fromkeys(number))}
     for column, colour, shift, label in (
-        ("promised", _GREY, -0.2, "promised by the search"),
+        ("promised", _GREY, -0.2, "promised by one seed"),
         ("holds", _BLUE, 0.2, f"{seeds} fresh seeds"),
     ):
         held = best[column].to_numpy(bool)
@@ -151,6 +151,9 @@ def draw_search(tried: pd.DataFrame, confirmed: pd.DataFrame) -> Figure:
         claims.bar(np.arange(len(places)) + shift, share, width=0.38, color=colour, label=label)
     claims.set_xticks(list(places.values()), list(places), fontsize=6)
     claims.set_ylabel("statements that hold (%)")
-    claims.set_title("the best reading, claim by claim", fontsize=8)
-    claims.legend(fontsize=6)
+    claims.set_axisbelow(True)
+    claims.set_ylim(0, 120)  # room for the legend
+    claims.set_yticks(range(0, 101, 20))
+    claims.set_title(f"the best reading ({best.reading.iloc[0]}), claim by claim", fontsize=8)
+    claims.legend(fontsize=6, ncol=2, loc="upper center")
     return figure
