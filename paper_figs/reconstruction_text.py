@@ -58,9 +58,9 @@ def _named(reading: str) -> str:
     return f"reading {number} of the {study}" if study else f"the {reading}"
 
 
-def _pair(values: pd.Series) -> str:
+def _pair(values: Mapping[Hashable, Any]) -> str:
     """Whether a reading has the two answers that decide most."""
-    has = int(values["hparams.loss"] == "huber") + int(values[SOURCE] == "table1")
+    has = [values["hparams.loss"] == "huber", values[SOURCE] == "table1"].count(True)
     return f"It has {('neither', 'one', 'both')[has]} of the Huber loss in the target and Table I's source."
 
 
@@ -97,7 +97,7 @@ def best_list(published: Path) -> str:
         f"the text: its single seed promised {int(best.promised.sum())} of {len(best)} statements (agreement "
         f"{percent(agreement[name])}, default {percent(agreement[DEFAULT])}), and {int(best.n_seeds.max())} fresh "
         f"seeds gave {int(best.holds.sum())} (agreement {percent(multiverse.agreement(best).mean())}): {_count(best)}.",
-        _pair(tried.set_index("reading").loc[name]),
+        _pair(tried.set_index("reading").loc[name].to_dict()),
         _converged(best),
         _nowhere(tried, closest) or f"Each statement's estimate is on its side in some of the {len(tried)} readings.",
         f"In less than {percent(_RARE)} of them: {_names(rare.claim)}.",
