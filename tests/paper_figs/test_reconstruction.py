@@ -1,16 +1,19 @@
 """The search for a reading, in made-up worlds in which the right one is known."""
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
 import worlds
 
 from jrcjax.config.paths import parameter_at
+from jrcjax.readings import Loss
 from paper_figs.claims.table import CLAIMS as TABLE
 from paper_figs.claims.table import number_of
 from paper_figs.studies import multiverse, reconstruction
 from sweeps.__main__ import main
-from sweeps.preset import SOURCES, base_of, preset_of
+from sweeps.preset import SOURCES, base_of, preset_of, set_in
 from sweeps.studies.multiverse import points_of
 from sweeps.studies.readings import PER_BLOCK, READINGS, SOURCE, default_unit, is_static, unit_of, values_at
 from sweeps.studies.reconstruction import Effort, confirmation_sweep, effort_of
@@ -257,6 +260,21 @@ def test_the_usual_effort():
 
 
 @pytest.mark.slow
+def test_the_preset_best_is_the_published_best_reading():
+    published = Path(__file__).parents[2] / "published" / "reconstruction"
+    tried, confirmed = (pd.read_csv(published / f"{name}.csv") for name in ("tried", "confirmed"))
+    (name,) = confirmed.reading[["all" in best_for.split() for best_for in confirmed.best_for]].unique()
+    values = tried.set_index("reading").loc[name]
+    assert tried.agreement.max() == values.agreement
+    own = set_in(preset_of("best"))
+    assert set(own) == {reading.path for reading in READINGS}
+    for path, value in own.items():
+        assert float(values[path]) == value if isinstance(value, float) else values[path] == value
+    source, target = (base_of(name, preset_of("best")) for name in ("source", "target"))
+    assert target.points.hparams.loss == Loss.HUBER
+    assert source.points.hparams.loss == Loss.SQUARED  # Table I's
+
+
 def test_a_tiny_search_runs_from_the_command_to_a_preset(tmp_path):
     run = ["run", "reconstruction", "--smoke", "--episodes", "1", "--out", str(tmp_path)]
     assert main(run) == 0
