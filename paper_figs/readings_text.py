@@ -22,6 +22,8 @@ from sweeps.studies.readings import READINGS, SOURCE, Reading, as_text, choices,
 
 NAMED = ("C3 (TLwD)", "C5 (highest)", "C8 (miss detection, DDQN)", "C13 (highest)")
 """Statements that the first page names."""
+FIGURES = "figures"
+"""The published figures under the default readings."""
 HUBER = "huber"
 """The published sweep of the Huber loss."""
 TOGETHER = ("C5 (highest)", "C13 (highest)")

@@ -23,9 +23,10 @@ from paper_figs.claims.judge import VERDICTS, Judgement, from_json
 from paper_figs.claims.learning_table import LABELS
 from paper_figs.claims.table import TITLES, number_of
 from paper_figs.markdown import listed, percent, table, wrapped
+from paper_figs.readings_text import FIGURES
 
-FIGURES, ROBUSTNESS, CALIBRATION = "figures", "robustness", "calibration"
-"""Folders of published results: of `make figures`, of the robustness study, and of `paper_figs.calibration`."""
+ROBUSTNESS, CALIBRATION = "robustness", "calibration"
+"""Folders of published results: of the robustness study, and of `paper_figs.calibration`."""
 _BEGIN = "<!-- made by python -m paper_figs.publish: {name} -->"
 _END = "<!-- end of {name} -->"
 _ANY = re.compile(r"<!-- made by python -m paper_figs\.publish: (\S+) -->\n(.*?)<!-- end of \1 -->", re.DOTALL)

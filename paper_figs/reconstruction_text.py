@@ -14,15 +14,15 @@ from paper_figs.claims import words
 from paper_figs.claims.learning_table import LABELS
 from paper_figs.claims.table import number_of
 from paper_figs.markdown import listed, percent, table
-from paper_figs.readings_text import NAMED, csv_of, short
+from paper_figs.readings_text import FIGURES, NAMED, csv_of, short
 from paper_figs.studies import multiverse
-from paper_figs.studies.reconstruction import ALL, DEFAULT
+from paper_figs.studies.reconstruction import ALL, BEST, DEFAULT
 from sweeps.studies.readings import READINGS, SOURCE
 from sweeps.studies.reconstruction import NAME
 
 _RARE = 0.05
 _CONVERGING = ("tlwd", "dpr", "ddqn")
-_PAGE = "docs/explanation/readings.md#the-reading-in-which-most-of-the-text-holds"
+_PAGE = "docs/explanation/readings.md#the-best-reading"
 
 
 def _tables(published: Path) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
@@ -71,15 +71,37 @@ def _converged(best: pd.DataFrame) -> str:
     return f"In it policies converge at p_1^v = 0.8 in episode (median): {when}."
 
 
+def _world(published: Path) -> str:
+    """What there is to learn in the best reading: the exact optimum of its Figs. 6 to 8, beside the default's."""
+    (sent, gap), (of_default, gap_of_default) = (_optimum(published / name) for name in (BEST, FIGURES))
+    return (
+        f"At the points of Figs. 6 to 8 its optimal policy sends at most {sent:.3g} packets per episode (default: "
+        f"{of_default:.3g}), and one action in every state earns at most {percent(gap)} less (default: "
+        f"{percent(gap_of_default)})" + (": no trade-off is left to learn." if sent < 1 else ".")
+    )
+
+
+def _optimum(folder: Path) -> tuple[float, float]:
+    """The most packets that the optimum of Figs. 6 to 8 sends, and the largest share that the best constant loses."""
+    numbers = pd.concat([pd.read_csv(folder / f"fig{number}.csv") for number in (6, 7, 8)])
+    reward, packets = (
+        numbers[numbers.panel == panel].pivot(index=["figure", "x"], columns="algorithm", values="mean")
+        for panel in "ab"
+    )
+    lost = 1.0 - reward["constant"].to_numpy() / reward["optimum"].to_numpy()
+    return float(packets["optimum"].to_numpy().max()), float(lost.max())
+
+
 def search_list(published: Path) -> str:
     """How far the best reading goes, and what holds in none, in two sentences."""
     tried, confirmed, closest = _tables(published)
     best, rarest = _for(confirmed, ALL), closest.nsmallest(1, "holds").to_dict("records")[0]
     headlines = best[best.claim.isin(NAMED)].groupby("verdict", sort=False).claim.agg(", ".join)
     sentences = [
-        f"Of {len(tried)} readings, {_searched(tried)} of them proposed by a search, {_named(best.reading.iloc[0])} "
-        f"agrees best with the text: of {len(best)} statements {_count(best)} by {int(best.n_seeds.max())} fresh seeds "
-        f"([all]({_PAGE})), {'; '.join(f'{claims} {verdict}' for verdict, claims in headlines.items())} among them.",
+        f"Of {len(tried)} readings, {_searched(tried)} of them from a search, {_named(best.reading.iloc[0])} fits the "
+        f"text best: of {len(best)} statements {_count(best)} by {int(best.n_seeds.max())} fresh seeds "
+        f"([all]({_PAGE})), with {'; '.join(f'{claims} {verdict}' for verdict, claims in headlines.items())}.",
+        _world(published),
         _nowhere(tried, closest)
         or f"By its estimate each statement holds in some reading; {rarest['claim']} in {rarest['holds']} only.",
     ]
@@ -98,6 +120,7 @@ def best_list(published: Path) -> str:
         f"{percent(agreement[name])}, default {percent(agreement[DEFAULT])}), and {int(best.n_seeds.max())} fresh "
         f"seeds gave {int(best.holds.sum())} (agreement {percent(multiverse.agreement(best).mean())}): {_count(best)}.",
         _pair(tried.set_index("reading").loc[name].to_dict()),
+        _world(published),
         _converged(best),
         _nowhere(tried, closest) or f"Each statement's estimate is on its side in some of the {len(tried)} readings.",
         f"In less than {percent(_RARE)} of them: {_names(rare.claim)}.",

@@ -12,6 +12,7 @@ from paper_figs.analysis import divergence
 from paper_figs.analysis.statistics import bins_of, mean_over_seeds
 from paper_figs.plots import style
 
+_INSET = (0.3, 0.26, 0.66, 0.42)  # left, bottom, width and height, as shares of the axes
 COLUMNS = ["figure", "panel", "algorithm", "x", "mean", "ci_low", "ci_high", "n_seeds", "n_diverged"]
 
 
@@ -79,14 +80,14 @@ def _plot(axes: Axes, numbers: pd.DataFrame) -> None:
 
 
 def _enlarge(axes: Axes, numbers: pd.DataFrame) -> None:
-    """Enlarges what lies near the optimum in the second half, if the full range hides it."""
+    """Enlarges what lies near the optimum in the second half, where there is room for it between the curves."""
     late = numbers.query("x > x.max() / 2")
     span = numbers["mean"].max() - numbers["mean"].min()
     best = numbers.loc[numbers["algorithm"] == "optimum", "mean"].to_numpy()[0]
     near = late.loc[(late["mean"] - best).abs() < 0.15 * span]
-    if set(near["algorithm"]) <= set(style.EXACT):
+    if set(near["algorithm"]) <= set(style.EXACT) or _hides(axes, numbers):
         return
-    inset = axes.inset_axes((0.3, 0.26, 0.66, 0.42))
+    inset = axes.inset_axes(_INSET)
     _plot(inset, numbers)
     low, high = near[["mean", "ci_low"]].min().min(), near[["mean", "ci_high"]].max().max()
     margin = 0.1 * (high - low)
@@ -94,3 +95,12 @@ def _enlarge(axes: Axes, numbers: pd.DataFrame) -> None:
     inset.set_ylim(low - margin, high + margin)
     inset.tick_params(labelsize=6)
     axes.indicate_inset_zoom(inset, edgecolor="0.4", linewidth=0.6)
+
+
+def _hides(axes: Axes, numbers: pd.DataFrame) -> bool:
+    """Whether an inset would lie over a curve."""
+    left, bottom, width, height = _INSET
+    (low, high), most = axes.get_ylim(), numbers.x.max()
+    x, height_of_curve = numbers.x / most, (numbers["mean"] - low) / (high - low)
+    behind = (x > left) & (x < left + width) & (height_of_curve > bottom) & (height_of_curve < bottom + height)
+    return bool(behind.any())

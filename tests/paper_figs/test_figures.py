@@ -71,6 +71,14 @@ def test_drawn_curves_are_the_table():
     assert "slot" in axes.get_ylabel()
 
 
+@pytest.mark.parametrize(("other", "insets"), [(-10.0, 1), (-1.0, 0)])
+def test_an_inset_enlarges_what_is_near_the_optimum_and_hides_no_curve(other, insets):
+    levels = {"optimum": 10.0, "tlwd": 9.5, "round_robin": -10.0, "ddqn": other}
+    rows = [("5", "b", name, x, mean, mean, mean, 2, 0) for name, mean in levels.items() for x in range(10, 1001, 10)]
+    axes = curves.draw(pd.DataFrame(rows, columns=curves.COLUMNS), "title").axes[0]
+    assert len(axes.child_axes) == insets
+
+
 def test_one_seed_is_drawn_without_a_band():
     axes = curves.draw(curves.table(results(seeds=1), "5", "a"), "title").axes[0]
     assert "no interval" in axes.get_title()

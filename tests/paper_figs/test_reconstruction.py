@@ -1,5 +1,6 @@
 """The search for a reading, in made-up worlds in which the right one is known."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -267,6 +268,10 @@ def test_the_preset_best_is_the_published_best_reading():
     values = tried.set_index("reading").loc[name]
     assert tried.agreement.max() == values.agreement
     own = set_in(preset_of("best"))
+    manifests = list((published.parent / "best").glob("*.manifest.json"))
+    assert manifests
+    for manifest in manifests:
+        assert json.loads(manifest.read_text())["configuration"]["preset"] == preset_of("best"), manifest
     assert set(own) == {reading.path for reading in READINGS}
     for path, value in own.items():
         assert float(values[path]) == value if isinstance(value, float) else values[path] == value
