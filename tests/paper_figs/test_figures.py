@@ -127,7 +127,7 @@ def test_one_command_writes_everything(tmp_path, capsys):
         (["--seeds", "-1"], "seeds: -1; allowed: an int from 1"),
         (["--delta.reward", "0"], "delta.reward: 0.0; allowed: a number > 0"),
         (["--delta.episodes", "nan"], "delta.episodes: nan; allowed: a number > 0"),
-        (["--preset", "x"], "preset: 'x'; allowed: paper, paper_table, or a file"),
+        (["--preset", "x"], "preset: 'x'; allowed: paper, paper_table, best, or a file"),
     ],
 )
 def test_command_line_errors_write_nothing(arguments, message, capsys, tmp_path):

@@ -246,7 +246,10 @@ def test_values_that_mean_nothing_are_refused(path, text, message, point):
         (["--vary", "env.radar.density=5,9", "--base", "mars"], "base: 'mars'; allowed: source, target, or a file"),
         (["--vary", "env.radar.density=5,9", "--name", "fig6"], "name: 'fig6'; allowed: letters, digits"),
         (["--vary", "env.radar.density=5,9", "--name", "../up"], "name: '../up'; allowed: letters, digits"),
-        (["--vary", "env.radar.density=5,9", "--preset", "x"], "preset: 'x'; allowed: paper, paper_table, or a file"),
+        (
+            ["--vary", "env.radar.density=5,9", "--preset", "x"],
+            "preset: 'x'; allowed: paper, paper_table, best, or a file",
+        ),
     ],
 )
 def test_bad_options_write_nothing(options, message, capsys, tmp_path):

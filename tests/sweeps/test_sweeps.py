@@ -184,7 +184,7 @@ def test_bad_sizes_are_refused(field, value, tmp_path):
     [
         (["run", "fig99"], "name: 'fig99' is unknown; allowed: 'fig5a', 'fig5b', 'fig6'"),
         (["run", "fig5a", "--seeds", "0"], "seeds: 0; allowed: an int from 1 to 1000000"),
-        (["run", "fig5a", "--preset", "table"], "preset: 'table'; allowed: paper, paper_table, or a file"),
+        (["run", "fig5a", "--preset", "table"], "preset: 'table'; allowed: paper, paper_table, best, or a file"),
     ],
 )
 def test_command_line_errors_name_field_value_and_allowed(arguments, message, capsys, tmp_path):
