@@ -197,7 +197,7 @@ def huber_list(published: Path) -> str:
 
 
 def short(value: object) -> str:
-    """A name, or a number with three digits, those before the point at least."""
+    """A name, or a number with three digits, or with all of those before the point."""
     if not isinstance(value, int | float):
         return str(value)
     return f"{value:.0f}" if abs(value) >= 1000 else f"{value:.3g}"

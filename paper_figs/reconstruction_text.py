@@ -45,9 +45,9 @@ def _searched(tried: pd.DataFrame) -> int:
 def _nowhere(tried: pd.DataFrame, closest: pd.DataFrame) -> str:
     """What holds in no reading, with the largest share of the space that readings drawn from it leave to that."""
     claims = closest.claim[closest.holds == 0]
-    most = float(proportion_effect(0, len(tried) - _searched(tried)).high)
     if claims.empty:
         return ""
+    most = float(proportion_effect(0, len(tried) - _searched(tried)).high)
     share = f"in none of the {len(tried)} readings, so in at most {percent(most)} of the space"
     return f"On their side {share}: {_names(claims)}."
 
@@ -93,7 +93,7 @@ def _optimum(folder: Path) -> tuple[float, float]:
 
 
 def search_list(published: Path) -> str:
-    """How far the best reading goes, and what holds in none, in two sentences."""
+    """How far the best reading goes, what there is to learn in it, and what holds in none, for the first page."""
     tried, confirmed, closest = _tables(published)
     best, rarest = _for(confirmed, ALL), closest.nsmallest(1, "holds").to_dict("records")[0]
     headlines = best[best.claim.isin(NAMED)].groupby("verdict", sort=False).claim.agg(", ".join)

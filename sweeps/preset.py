@@ -14,7 +14,8 @@ of the settings among them, in the source and in the target alike:
 
 With the last line the source agents have Table I's hyperparameters and settings instead.
 
-A file in the folder `presets` beside this module, if there is one, is named without its suffix.
+A file in the folder `presets` beside this module is named without its suffix: `best` is the reading in which most of
+the paper's text holds, of all that the published search tried.
 
 A preset is a string: one of `PRESETS`, or the text of a file, so that workers and whoever verifies results have all
 that it says.

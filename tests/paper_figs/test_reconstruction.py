@@ -260,7 +260,6 @@ def test_the_usual_effort():
     assert effort_of(None, None, smoke=False) == Effort(304, 100, 3, 16)
 
 
-@pytest.mark.slow
 def test_the_preset_best_is_the_published_best_reading():
     published = Path(__file__).parents[2] / "published" / "reconstruction"
     tried, confirmed = (pd.read_csv(published / f"{name}.csv") for name in ("tried", "confirmed"))
@@ -280,6 +279,7 @@ def test_the_preset_best_is_the_published_best_reading():
     assert source.points.hparams.loss == Loss.SQUARED  # Table I's
 
 
+@pytest.mark.slow
 def test_a_tiny_search_runs_from_the_command_to_a_preset(tmp_path):
     run = ["run", "reconstruction", "--smoke", "--episodes", "1", "--out", str(tmp_path)]
     assert main(run) == 0
