@@ -18,6 +18,7 @@ there are.
 from __future__ import annotations
 
 import functools
+import itertools
 import operator
 from typing import NamedTuple
 
@@ -167,8 +168,10 @@ def sample(tree: Float, words: Words, layout: Layout) -> tuple[Int, Float]:
 
 def _node_at(rows: Float, share: Float) -> Int:
     """Which of the values [N, children] lies at these shares [B] of their running sum, among the positive ones, [B]."""
-    within = rows @ jnp.triu(jnp.ones((rows.shape[1],) * 2, rows.dtype))  # sums up to each value
-    before = jnp.tril(jnp.ones((rows.shape[0],) * 2, rows.dtype), -1) @ within[:, -1]
+    # Written out: XLA hands what it knows as running sums, or as products, to a library, away from its loops.
+    within = jnp.stack(list(itertools.accumulate(rows.T)), axis=1)  # sums up to each value
+    of_rows = list(itertools.accumulate(within[:, -1]))
+    before = jnp.stack([jnp.zeros_like(of_rows[0]), *of_rows[:-1]])
     running = before[:, None] + within
     at = share * running[-1, -1]
     # Row by row, which leaves a short sum, and vectors of a row's length.

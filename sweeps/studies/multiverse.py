@@ -70,6 +70,7 @@ def block_sweep(
     numbers: Sequence[int],
     values: Sequence[Mapping[str, float]],
     points: Sequence[int] = range(len(POINTS)),
+    seeds_per_part: int = SIZE.seeds,
 ) -> Sweep:
     """Points of some readings, as one program for each optimiser and n.
 
@@ -78,6 +79,7 @@ def block_sweep(
       numbers: of the readings, ascending.
       values: of each reading by path; what is left out is as by default.
       points: places in POINTS.
+      seeds_per_part: see `Sweep`; readings of a block fill the devices with few seeds.
     """
     number = {"prioritised": 1.0}
     rows = [
@@ -96,7 +98,7 @@ def block_sweep(
         design=design.table(sources, {"reading": ""} | _paths([_source(of) for of in values])),
         hands_on=True,
         own=True,
-        seeds_per_part=SIZE.seeds,
+        seeds_per_part=seeds_per_part,
     )
     return Sweep(
         name=name,
@@ -106,7 +108,7 @@ def block_sweep(
         source=source,
         source_points=tuple(np.repeat(range(len(numbers)), len(points)).tolist()),
         own=True,
-        seeds_per_part=SIZE.seeds,
+        seeds_per_part=seeds_per_part,
     )
 
 

@@ -20,6 +20,7 @@ NAME = "reconstruction"
 STARTS = 3
 """Readings with different code that the search starts from."""
 _MOST = 2**20
+_CONFIRMED_PER_PART = 32  # a reading alone has few points, and one source agent per seed: this fills two cores with both
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,7 @@ def confirmation_sweep(unit: np.ndarray, figures: Collection[str]) -> Sweep:
     """A reading that is confirmed at the points of some figures, named by what it is."""
     values, points = values_at(unit), points_of(figures)
     name = hashlib.sha256(repr((values, points)).encode()).hexdigest()[:8]
-    return block_sweep(f"{NAME}/confirmed/{name}", [0], [values], points)
+    return block_sweep(f"{NAME}/confirmed/{name}", [0], [values], points, _CONFIRMED_PER_PART)
 
 
 RECONSTRUCTION = Study(
