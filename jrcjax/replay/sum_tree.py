@@ -119,11 +119,17 @@ def update(tree: Float, indices: Int, values: Float, layout: Layout) -> Float:
     """
     *lower, top = layout.first_row
     for first_row in lower:
-        row = first_row + layout.parent(indices)
-        tree = tree.at[row, layout.column(indices)].set(values, mode="promise_in_bounds")
-        values = _sum(tree.at[row].get(mode="promise_in_bounds"))
+        tree = _with(tree, first_row, indices, values)
         indices = layout.parent(indices)
-    return tree.at[top + layout.parent(indices), layout.column(indices)].set(values, mode="promise_in_bounds")
+        values = _sum(tree.at[first_row + indices].get(mode="promise_in_bounds"))
+    return _with(tree, top, indices, values)
+
+
+def _with(tree: Float, first_row: int, indices: Int, values: Float) -> Float:
+    """The tree with these values at these places [B] of the level that begins at `first_row`."""
+    # By one number each, since XLA writes row and column of every place to memory before it goes there.
+    flat = tree.reshape(-1).at[first_row * tree.shape[1] + indices].set(values, mode="promise_in_bounds")
+    return flat.reshape(tree.shape)
 
 
 def update_one(tree: Float, index: Int, value: Float, layout: Layout) -> Float:
