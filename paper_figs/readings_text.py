@@ -46,7 +46,7 @@ def _holds(row: Mapping[Hashable, Any]) -> str:
     return _share(row, "holds") + (f", unknown in {percent(row['unknown'])}" if row["unknown"] else "")
 
 
-def _share_of(holds: pd.Series) -> str:
+def share_of(holds: pd.Series) -> str:
     """The share of readings in which a statement holds."""
     if holds.empty:
         return "not among these readings"
@@ -104,7 +104,7 @@ def _together(verdicts: pd.DataFrame) -> str:
     for claim in TOGETHER:
         holds = verdicts.query("claim == @claim and reading > 0").set_index("reading").holds.astype(bool)
         here = both[holds.index.to_numpy(int)]
-        parts.append(f"{claim} holds in {_share_of(holds[here])}, in all others in {_share_of(holds[~here])}")
+        parts.append(f"{claim} holds in {share_of(holds[here])}, in all others in {share_of(holds[~here])}")
     return (
         "With the Huber loss in the target and Table I's source together, "
         + "; ".join(parts)
@@ -137,7 +137,7 @@ def answers_table(published: Path) -> str:
         holds = verdicts.query("claim == @claim and reading > 0").set_index("reading").holds.astype(bool)
         for label in _strongest(sensitivity, claim, 2)["input"]:
             names, which = _answers(by_label[label], places[label].loc[holds.index].to_numpy())
-            cells = [f"{name}: {_share_of(holds[which == i])}" for i, name in enumerate(names)]
+            cells = [f"{name}: {share_of(holds[which == i])}" for i, name in enumerate(names)]
             rows.append((claim, label, "; ".join(cells)))
     return table(("statement", "question", "holds in (95 % interval), by answer"), rows)
 

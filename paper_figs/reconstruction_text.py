@@ -14,13 +14,15 @@ from paper_figs.claims import words
 from paper_figs.claims.learning_table import LABELS
 from paper_figs.claims.table import number_of
 from paper_figs.markdown import listed, percent, table
-from paper_figs.readings_text import FIGURES, NAMED, csv_of, short
+from paper_figs.readings_text import FIGURES, NAMED, csv_of, share_of, short
 from paper_figs.studies import multiverse
-from paper_figs.studies.reconstruction import ALL, BEST, DEFAULT
-from sweeps.studies.readings import READINGS, SOURCE
+from paper_figs.studies.reconstruction import ALL, BEST, DEFAULT, LEAST_LOSS, TRADE_OFF
+from sweeps.studies.multiverse import MULTIVERSE
+from sweeps.studies.readings import READINGS, SOURCE, Reading
 from sweeps.studies.reconstruction import NAME
 
 _RARE = 0.05
+_FEW = 8  # answers to a question that are told one by one
 _CONVERGING = ("tlwd", "dpr", "ddqn")
 _PAGE = "docs/explanation/readings.md#the-best-reading"
 
@@ -92,6 +94,80 @@ def _optimum(folder: Path) -> tuple[float, float]:
     return float(packets["optimum"].to_numpy().max()), float(lost.max())
 
 
+def trade_off_list(published: Path) -> str:
+    """In how much of the space one action is not enough in the target, by which answers, and what fits best there."""
+    tried, confirmed, _ = _tables(published)
+    sample, has = _of_multiverse(tried)
+    share, low, high = (percent(float(limit)) for limit in proportion_effect(has.sum(), len(sample)))
+    if not has.any():
+        return listed([f"One action in every state is optimal in the target of all {len(sample)} readings."])
+    least, elsewhere = sample.lost_by_one_action[has].min(), sample.lost_by_one_action[~has].max()
+    none = _answers_without(sample, has)
+    without = ~np.any([sample[r.path].astype(str) == answer for r, answer in none], axis=0) if none else has | True
+    fields = "; ".join(f"`{reading.path}` {answer}" for reading, answer in none) or "none"
+    sentences = [
+        f"In {share} ({low} to {high}) of the multiverse's readings the best action in every state loses part of what "
+        f"the target's optimal policy earns, at least {percent(least)}; in all others at most {percent(elsewhere)}.",
+        f"Answers with which no reading has a trade-off: {fields}. Of the {without.sum()} readings without them "
+        f"{(has & without).sum()} have one.",
+        "On their side in readings with a trade-off, and in those without one: "
+        f"{_by_trade_off(published, sample, has)}.",
+        _best_with_trade_off(tried, _for(confirmed, TRADE_OFF)),
+    ]
+    return listed(sentences)
+
+
+def _by_trade_off(published: Path, sample: pd.DataFrame, has: pd.Series) -> str:
+    """In which share of the multiverse's readings with a trade-off, and of those without, the headlines hold."""
+    shares = ((claim, *(_held(published, sample[which], claim) for which in (has, ~has))) for claim in NAMED)
+    return "; ".join(f"{claim} in {with_one} and {without}" for claim, with_one, without in shares)
+
+
+def _held(published: Path, sample: pd.DataFrame, claim: str) -> str:
+    """In which share of these readings of the multiverse a statement's estimate is on its side."""
+    found = csv_of(published, MULTIVERSE.name, "verdicts")
+    of_sample = found.reading.isin(sample.reading.map(_number)) & (found.claim == claim)
+    return share_of(found.holds[of_sample].astype(bool))
+
+
+def _of_multiverse(tried: pd.DataFrame) -> tuple[pd.DataFrame, pd.Series]:
+    """The readings that no search proposed, and which of them have a trade-off."""
+    sample = tried[~tried.reading.str.startswith("search")]
+    return sample, sample.lost_by_one_action >= LEAST_LOSS
+
+
+def _number(reading: str) -> int:
+    """The number in the multiverse of a reading of it."""
+    return 0 if reading == DEFAULT else int(reading.rpartition(" ")[2])
+
+
+def _answers_without(sample: pd.DataFrame, has: pd.Series) -> list[tuple[Reading, str]]:
+    """The answers to questions, of a few answers each, with which no reading has a trade-off."""
+    found = []
+    for reading in READINGS:
+        answers = sample[reading.path].astype(str)
+        if 1 < answers.nunique() <= _FEW:
+            found += [(reading, answer) for answer in answers.unique() if not has[answers == answer].any()]
+    return found
+
+
+def _best_with_trade_off(tried: pd.DataFrame, best: pd.DataFrame) -> str:
+    """What agrees best with the text of the readings with a trade-off, and what fresh seeds say of it."""
+    worth = tried[tried.lost_by_one_action >= LEAST_LOSS]
+    of_them = f"Of all {len(worth)} readings with a trade-off, those of the search included,"
+    if best.empty:
+        name = worth.reading[worth.agreement.idxmax()]
+        return f"{of_them} {_named(name)} agrees best with the text; its fresh seeds are still to come."
+    name = best.reading.iloc[0]
+    agreement = worth.agreement[worth.reading == name].iloc[0]
+    return (
+        f"{of_them} {_named(name)} agrees best with the text: its single seed promised {int(best.promised.sum())} of "
+        f"{len(best)} statements (agreement {percent(agreement)}), and {int(best.n_seeds.max())} fresh seeds gave "
+        f"{int(best.holds.sum())} (agreement {percent(multiverse.agreement(best).mean())}): {_count(best)}. "
+        f"Supported: {_names(best.claim[best.verdict == 'supported'])}."
+    )
+
+
 def search_list(published: Path) -> str:
     """How far the best reading goes, what there is to learn in it, and what holds in none, for the first page."""
     tried, confirmed, closest = _tables(published)
@@ -101,11 +177,36 @@ def search_list(published: Path) -> str:
         f"Of {len(tried)} readings, {_searched(tried)} of them from a search, {_named(best.reading.iloc[0])} fits the "
         f"text best: of {len(best)} statements {_count(best)} by {int(best.n_seeds.max())} fresh seeds "
         f"([all]({_PAGE})), with {'; '.join(f'{claims} {verdict}' for verdict, claims in headlines.items())}.",
-        _world(published),
-        _nowhere(tried, closest)
-        or f"By its estimate each statement holds in some reading; {rarest['claim']} in {rarest['holds']} only.",
+        f"{_world_in_short(published)} {_trade_off_in_short(published, tried, confirmed)} "
+        + (
+            _nowhere(tried, closest)
+            or f"Each statement's estimate holds in some reading, {rarest['claim']}'s in {rarest['holds']}."
+        ),
     ]
     return listed(sentences)
+
+
+def _world_in_short(published: Path) -> str:
+    (_, gap), (_, of_default) = (_optimum(published / name) for name in (BEST, FIGURES))
+    where = f"at the points of Figs. 6 to 8 (default: it loses up to {percent(of_default)})"
+    if gap < LEAST_LOSS:
+        return f"One action in every state is optimal in it {where}."
+    return f"One action in every state loses up to {percent(gap)} in it {where}."
+
+
+def _trade_off_in_short(published: Path, tried: pd.DataFrame, confirmed: pd.DataFrame) -> str:
+    """How many readings have a trade-off, whether C3 holds in them, and which fits the text best."""
+    sample, has = _of_multiverse(tried)
+    worth, best = tried[tried.lost_by_one_action >= LEAST_LOSS], _for(confirmed, TRADE_OFF)
+    if not has.any():
+        return "No reading of the multiverse has a trade-off in the target."
+    page, claim = _PAGE.replace("the-best-reading", "where-there-is-a-trade-off"), NAMED[0]
+    share, fresh = percent(has.mean()), "fresh seeds to come" if best.empty else f"{_count(best)}"
+    return (
+        f"{share} of the multiverse have [a trade-off]({page}) in the target: there {claim} holds in "
+        f"{_held(published, sample[has], claim)}, and {_named(worth.reading[worth.agreement.idxmax()])} fits best "
+        f"({fresh})."
+    )
 
 
 def best_list(published: Path) -> str:
@@ -125,13 +226,14 @@ def best_list(published: Path) -> str:
         _nowhere(tried, closest) or f"Each statement's estimate is on its side in some of the {len(tried)} readings.",
         f"In less than {percent(_RARE)} of them: {_names(rare.claim)}.",
     ]
-    if to_come := [number for number in confirmed.number.unique() if _for(confirmed, number).empty]:
+    wanted = [*confirmed.number.unique(), *([TRADE_OFF] if (tried.lost_by_one_action >= LEAST_LOSS).any() else [])]
+    if to_come := [what for what in wanted if _for(confirmed, what).empty]:
         return listed([*sentences, f"Fresh seeds in the best readings for {', '.join(to_come)} are still to come."])
     sentences += [
-        f"Beyond that reading, which is the best for all claims together, fresh seeds in the best reading for each "
-        f"claim support: {_names(_supported_beyond(confirmed, best))}.",
-        f"On their side in some readings, and supported by fresh seeds neither in the best reading for all nor in that "
-        f"for their claim: {_names(_unconfirmed(confirmed, closest))}.",
+        f"Beyond that reading, which is the best for all claims together, fresh seeds in the other readings support: "
+        f"{_names(_supported_beyond(confirmed, best))}.",
+        f"On their side in some readings, and supported by fresh seeds in none of those that were run with them: "
+        f"{_names(_unconfirmed(confirmed, closest))}.",
     ]
     return listed(sentences)
 
@@ -169,21 +271,22 @@ def best_values_table(published: Path) -> str:
 
 
 def confirmed_table(published: Path) -> str:
-    """One row per statement: promise and confirmation in the best reading for all, and in the best for its claim."""
+    """One row per statement: promise and confirmation in the best readings for all, with a trade-off, for its claim."""
     _, confirmed, closest = _tables(published)
     rows = []
     for row in closest.to_dict("records"):
         of_claim = confirmed.loc[confirmed.claim == row["claim"]]
         cells = []
-        for what in (ALL, number_of(str(row["claim"]))):
+        for what in (ALL, TRADE_OFF, number_of(str(row["claim"]))):
             of_reading = _for(of_claim, what).to_dict("records")
             cells.append(_side_by_side(of_reading[0]) if of_reading else "")
         reading = next(iter(_for(of_claim, number_of(str(row["claim"]))).reading), "to come")
-        rows.append((str(row["claim"]), f"{row['holds']} of {row['tried']}", cells[0], reading, cells[1]))
+        rows.append((str(row["claim"]), f"{row['holds']} of {row['tried']}", *cells[:2], reading, cells[2]))
     head = (
         "statement",
         "on its side in",
         "best for all: promised, confirmed",
+        "best with a trade-off: promised, confirmed",
         "best for its claim",
         "promised, confirmed",
     )
@@ -200,6 +303,7 @@ BLOCKS: dict[str, Callable[[Path], str]] = {
     "search": search_list,
     "best": best_list,
     "best_values": best_values_table,
+    "trade_off": trade_off_list,
     "confirmed": confirmed_table,
 }
 """Name of a marked part to what makes it from the folder of published results."""

@@ -118,12 +118,13 @@ def _draw_choices(axes: Axes, readings: pd.DataFrame, names: list[str]) -> None:
 
 
 @style.styled
-def draw_search(tried: pd.DataFrame, confirmed: pd.DataFrame) -> Figure:
+def draw_search(tried: pd.DataFrame, confirmed: pd.DataFrame, least_loss: float) -> Figure:
     """How the search went, and what it promised beside what fresh seeds gave.
 
     Args:
-      tried: a row per reading, in order, with its `agreement`.
+      tried: a row per reading, in order, with its `agreement` and the share `lost_by_one_action`.
       confirmed: a row per confirmed reading and statement.
+      least_loss: that of a reading with a trade-off.
     """
     figure = Figure(figsize=(style.TWO_COLUMNS[0], 2.9))
     way, claims = figure.subplots(1, 2, width_ratios=(2, 3))
@@ -132,6 +133,18 @@ def draw_search(tried: pd.DataFrame, confirmed: pd.DataFrame) -> Figure:
     for mask, colour, label in ((~searched, _GREY, "design"), (searched, _BLUE, "search")):
         if mask.any():
             way.plot(order[mask], 100 * tried.agreement[mask], ".", color=colour, markersize=2, label=label)
+    if (worth := tried.lost_by_one_action.to_numpy() >= least_loss).any():
+        label = "with a trade-off"
+        way.plot(
+            order[worth],
+            100 * tried.agreement[worth],
+            "o",
+            color=_GREEN,
+            markersize=2.5,
+            fillstyle="none",
+            markeredgewidth=0.6,
+            label=label,
+        )
     way.plot(order, 100 * tried.agreement.cummax(), color="black", linewidth=0.8, label="best so far")
     if (default := tried[tried.reading == _DEFAULT]).size:
         way.axhline(100 * default.agreement.iloc[0], color=_ORANGE, linestyle=":", label="default")

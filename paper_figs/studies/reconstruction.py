@@ -3,13 +3,14 @@
 CMA-ES with margin (Hamano et al. 2022) proposes readings, one generation after the other, from each start in turn; a
 generation is one block. What it maximises is the agreement: the mean over the paper's claims C1 to C15 of the share of
 their statements whose estimate is on the claim's side, all figures in one reading. The best of hundreds looks better
-than it is, so it is confirmed with seeds that nothing was chosen by.
+than it is, so it is confirmed with seeds that nothing was chosen by; and since it may be a world with nothing to learn,
+so is the best of those where it takes more than one action.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -22,9 +23,10 @@ from paper_figs.claims.table import CLAIMS, number_of
 from paper_figs.plots import readings as plot
 from paper_figs.plots import style
 from paper_figs.studies import multiverse
+from sweeps.engine.job import Job
 from sweeps.preset import preset_text
 from sweeps.results import store
-from sweeps.studies.multiverse import verdicts_file
+from sweeps.studies.multiverse import block_sweep, points_of, verdicts_file
 from sweeps.studies.readings import PER_BLOCK, READINGS, as_text, default_unit, is_static, range_of, unit_of, values_at
 from sweeps.studies.reconstruction import NAME, Effort, confirmation_sweep, generation_sweep, of_seeds
 from sweeps.sweep import Size, Sweep
@@ -39,6 +41,10 @@ DEFAULT = "default"
 """Name of the first reading of a multiverse."""
 ALL = "all"
 """What the reading is the best for that agrees most with all claims together."""
+TRADE_OFF = "trade-off"
+"""What the reading is the best for that agrees most of those with a trade-off."""
+LEAST_LOSS = 0.01
+"""Share of the optimum that the best action in every state loses at least in a target with a trade-off."""
 
 
 class Tried(NamedTuple):
@@ -81,13 +87,20 @@ def search(effort: Effort, size: Size, out: Path, run: Callable[..., Path]) -> l
         generation = [Tried(f"search {first + i}", *each) for i, each in enumerate(zip(units, verdicts, strict=True))]
         optimiser.tell([one.agreement for one in generation])
         found += generation
-    chosen, fresh = choice_of(known + found), of_seeds(size, size.seeds + effort.confirm)
+    tried = known + found
+    lost = lost_by_one_action([one.unit for one in tried])
+    chosen, fresh = choice_of(tried, lost), of_seeds(size, size.seeds + effort.confirm)
     confirmed, written = [], []
     for choice in chosen:
         sweep = confirmation_sweep(choice.reading.unit, choice.figures)
         confirmed += _kept(sweep, fresh, out, run, first_seed=size.seeds)
         # Each reading takes long, so the summary says what is confirmed so far.
-        written = _write(out / NAME / "summary", known + found, chosen[: len(confirmed)], confirmed)
+        tables = {
+            "tried": tried_table(tried, lost),
+            "confirmed": confirmed_table(chosen[: len(confirmed)], confirmed),
+            "closest": closest_table(tried),
+        }
+        written = _write(out / NAME / "summary", tables, chosen[0].reading)
     return written
 
 
@@ -96,11 +109,11 @@ class Choice(NamedTuple):
 
     reading: Tried
     best_for: tuple[str, ...]
-    """"all", or numbers of claims."""
+    """"all", "trade-off", or numbers of claims."""
 
     def speaks_of(self, claims: pd.Series) -> pd.Series:
         """Which statements it is to confirm: all, or those of the claims that it is the best for."""
-        return claims.map(lambda claim: bool({ALL, number_of(claim)} & set(self.best_for))).astype(bool)
+        return claims.map(lambda claim: bool({ALL, TRADE_OFF, number_of(claim)} & set(self.best_for))).astype(bool)
 
     @property
     def figures(self) -> set[str]:
@@ -162,12 +175,34 @@ def _starts(known: list[Tried], effort: Effort) -> list[np.ndarray]:
     return list(different.values())[::-1][: effort.starts]
 
 
-def choice_of(tried: list[Tried]) -> list[Choice]:
-    """The readings to confirm: the best for all claims together, and the best for each."""
+def lost_by_one_action(units: Sequence[np.ndarray]) -> np.ndarray:
+    """The share of the optimum that the best action in every state loses in the target as it is, exact, [readings].
+
+    Where it is 0 radar and data are no trade-off: an agent that ignores what it observes is optimal.
+    """
+    parts, one_episode = [], Size(seeds=1, episodes=1)
+    for first in range(0, len(units), PER_BLOCK):
+        values = [values_at(unit) for unit in units[first : first + PER_BLOCK]]
+        sweep = block_sweep(NAME, range(len(values)), values, points_of(()))
+        of = Job(sweep, one_episode).reference
+        parts.append((of.optimum.reward - of.constant.reward) / np.abs(of.optimum.reward))
+    return np.concatenate(parts)
+
+
+def choice_of(tried: list[Tried], lost: np.ndarray) -> list[Choice]:
+    """The readings to confirm: the best for all claims together, also of those with a trade-off, and for each claim.
+
+    Args:
+      tried: all readings.
+      lost: by one action in each, see `lost_by_one_action`.
+    """
     share = pd.DataFrame([multiverse.agreement(one.verdicts) for one in tried])
-    best = {ALL: int(share.mean(axis=1).argmax())}
+    agreement = share.mean(axis=1)
+    best = {ALL: int(agreement.argmax())}
+    if (lost >= LEAST_LOSS).any():
+        best[TRADE_OFF] = int(agreement.where(lost >= LEAST_LOSS).argmax())
     for claim in share.columns:  # of those where it holds best, the one that agrees most
-        best[claim] = int((share[claim] + 1e-3 * share.mean(axis=1)).argmax())
+        best[claim] = int((share[claim] + 1e-3 * agreement).argmax())
     chosen: dict[int, list[str]] = {}
     for what, place in best.items():
         chosen.setdefault(place, []).append(what)
@@ -193,29 +228,23 @@ def _verdicts(sweep: Sweep, size: Size, out: Path, first_seed: int) -> pd.DataFr
     return multiverse.verdicts(list(multiverse.of_readings(*data)))
 
 
-def _write(folder: Path, tried: list[Tried], chosen: list[Choice], confirmed: list[pd.DataFrame]) -> list[Path]:
+def _write(folder: Path, tables: Mapping[str, pd.DataFrame], best: Tried) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
-    best = chosen[0].reading
-    tables = {
-        "tried": tried_table(tried),
-        "confirmed": confirmed_table(chosen, confirmed),
-        "closest": closest_table(tried),
-    }
     preset = preset_text({}, {path: as_text(path, value) for path, value in values_at(best.unit).items()})
     return [
         *(style.save_table(table, folder / f"{name}.csv") for name, table in tables.items()),
         write_text(folder / PRESET_FILE, preset),
-        *style.save(plot.draw_search(tables["tried"], tables["confirmed"]), folder / NAME),
+        *style.save(plot.draw_search(tables["tried"], tables["confirmed"], LEAST_LOSS), folder / NAME),
     ]
 
 
-def tried_table(tried: list[Tried]) -> pd.DataFrame:
-    """One row per reading that was tried: the agreement of its estimates, and its values by path."""
+def tried_table(tried: list[Tried], lost: np.ndarray) -> pd.DataFrame:
+    """One row per reading that was tried: the agreement of its estimates, what one action loses, and values by path."""
     return pd.DataFrame(
         [
-            {"reading": one.name, "agreement": one.agreement}
+            {"reading": one.name, "agreement": one.agreement, "lost_by_one_action": share}
             | {path: as_text(path, value) for path, value in values_at(one.unit).items()}
-            for one in tried
+            for one, share in zip(tried, lost, strict=True)
         ]
     )
 

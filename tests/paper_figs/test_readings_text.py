@@ -30,12 +30,14 @@ def published(tmp_path):
         {"claim": "C3 (TLwD)", "input": MARGIN, "total": 0.2, "total_low": 0.01, "total_high": 0.3} | index,
     ]
     tried = [
-        {"reading": name, "agreement": agreement} | {reading.path: value for reading in READINGS} | {SOURCE: "table1"}
-        for name, agreement, value in (
-            ("default", 0.2, 0.5),
-            ("multiverse 3", 0.4, 0.5),
-            ("search 0", 0.6, 0.25),
-            ("search 1", 0.5, 0.5),
+        {"reading": name, "agreement": agreement, "lost_by_one_action": lost}
+        | {reading.path: value for reading in READINGS}
+        | {SOURCE: "table1", "env.reward_state": "current" if lost else "episode_start"}
+        for name, agreement, value, lost in (
+            ("default", 0.2, 0.5, 0.08),
+            ("multiverse 3", 0.4, 0.5, 0.0),
+            ("search 0", 0.6, 0.25, 0.0),
+            ("search 1", 0.5, 0.5, 0.05),
         )
     ]
 
@@ -53,7 +55,8 @@ def published(tmp_path):
             seen("search 0", "all C3 C4 C7 C11", f"C7 ({name})", False, value, value, value, "contradicted")
             for name, value in (("TLwD", 1.0), ("DPR", 120.0), ("DDQN", math.inf))
         ),
-        seen("search 1", "C5", "C5 (highest)", True, 2.0, 1.5, 2.5, "supported"),
+        seen("search 1", "trade-off C5", "C5 (highest)", True, 2.0, 1.5, 2.5, "supported"),
+        seen("search 1", "trade-off C5", "C4", False, 0.5, 0.4, 0.6, "contradicted"),
     ]
     holds = {"C3 (TLwD)": 3, "C4": 1, "C5 (highest)": 2, "C11": 0, "C7 (TLwD)": 4, "C7 (DPR)": 4, "C7 (DDQN)": 4}
     closest = [{"claim": claim, "tried": 4, "known": 4, "holds": held} for claim, held in holds.items()]
@@ -149,9 +152,9 @@ def test_promise_and_confirmation_stand_side_by_side(published):
     assert "- In it policies converge at p_1^v = 0.8 in episode (median): TLwD 1, DPR 120, DDQN never." in text
     world = "its optimal policy sends at most 0 packets per episode (default: 200), and one action in every state earns"
     assert f"{world} at most 25 % less (default: 25 %): no trade-off is left to learn." in text
-    assert "in the best reading for each claim support: C5 (highest)." in text
+    assert "fresh seeds in the other readings support: C5 (highest)." in text
     assert "in none of the 4 readings, so in at most 77.6 % of the space: C11." in text
-    assert "nor in that for their claim: C4; C7 (TLwD); C7 (DPR); C7 (DDQN)." in text
+    assert "in none of those that were run with them: C4; C7 (TLwD); C7 (DPR); C7 (DDQN)." in text
     first_page = " ".join(reconstruction_text.search_list(published).split())
     assert "Of 4 readings, 2 of them from a search, reading 0 of the search fits the text best:" in first_page
     assert "of 7 statements 1 supported, 5 contradicted, 1 undecided by 100 fresh seeds ([all](docs/" in first_page
@@ -159,34 +162,63 @@ def test_promise_and_confirmation_stand_side_by_side(published):
     assert "in none of the 4 readings, so in at most 77.6 % of the space: C11." in first_page  # 1 - 0.05 ** (1 / 2)
     rows = reconstruction_text.confirmed_table(published).splitlines()[2:]
     assert (
-        "| C5 (highest) | 2 of 4 | 1, 0.5 (0.4 to 0.6): contradicted | search 1 | 1, 2 (1.5 to 2.5): supported |"
-        in rows
+        "| C5 (highest) | 2 of 4 | 1, 0.5 (0.4 to 0.6): contradicted | 1, 2 (1.5 to 2.5): supported | search 1 "
+        "| 1, 2 (1.5 to 2.5): supported |" in rows
     )
-    assert "| C11 | 0 of 4 | 1, -1 (-2 to 0): undecided | search 0 | 1, -1 (-2 to 0): undecided |" in rows
+    assert "| C11 | 0 of 4 | 1, -1 (-2 to 0): undecided |  | search 0 | 1, -1 (-2 to 0): undecided |" in rows
     values = reconstruction_text.best_values_table(published).splitlines()[2:]
     assert len(values) == len(READINGS)
     assert f"| `{READINGS[0].path}` | {STEP} | 0.5 | 0.25 |" in values
 
 
+def test_where_there_is_a_trade_off_and_what_fits_best_there(published):
+    text = " ".join(reconstruction_text.trade_off_list(published).split())
+    assert "In 50 % (" in text  # of the default and one reading of a multiverse
+    assert "earns, at least 8 %; in all others at most 0 %." in text
+    assert "no reading has a trade-off: `env.reward_state` episode_start. Of the 1 readings without them 1 have" in text
+    assert (
+        "Of all 2 readings with a trade-off, those of the search included, reading 1 of the search agrees best" in text
+    )
+    assert "its single seed promised 1 of 2 statements (agreement 50 %), and 100 fresh seeds gave 1 " in text
+    assert "and in those without one: C3 (TLwD) in 0 % (0 to 95) and 100 % (5 to 100);" in text  # of a reading each
+    assert text.endswith("1 supported, 1 contradicted, 0 undecided. Supported: C5 (highest).")
+
+
+def test_the_first_page_says_how_many_readings_have_a_trade_off(published):
+    text = " ".join(reconstruction_text.search_list(published).split())
+    assert "loses up to 25 % in it at the points of Figs. 6 to 8 (default: it loses up to 25 %). 50 % of the" in text
+    assert "where-there-is-a-trade-off) in the target: there C3 (TLwD) holds in 0 % (0 to 95), and" in text
+    assert " and reading 1 of the search fits best (1 supported, 1 contradicted, 0 undecided)." in text
+
+
+def test_a_space_without_a_trade_off(published):
+    path = published / "reconstruction" / "tried.csv"
+    pd.read_csv(path).assign(lost_by_one_action=0.0).to_csv(path, index=False)
+    text = reconstruction_text.trade_off_list(published)
+    assert text == "- One action in every state is optimal in the target of all 2 readings."
+
+
 def test_a_world_where_each_statement_holds_somewhere(published):
     path = published / "reconstruction" / "closest.csv"
     pd.read_csv(path).assign(holds=[3, 1, 2, 4, 4, 4, 4]).to_csv(path, index=False)
-    first_page = reconstruction_text.search_list(published)
-    assert first_page.endswith("By its estimate each statement holds in some reading; C4 in 1 only.")
+    first_page = " ".join(reconstruction_text.search_list(published).split())
+    assert first_page.endswith("Each statement's estimate holds in some reading, C4's in 1.")
     text = " ".join(reconstruction_text.best_list(published).split())
     assert "Each statement's estimate is on its side in some of the 4 readings." in text
-    assert "in none of" not in text
+    assert "in none of the" not in text
 
 
 def test_what_is_not_yet_run_with_fresh_seeds_is_said(published):
     path = published / "reconstruction" / "confirmed.csv"
     confirmed = pd.read_csv(path)
-    confirmed[confirmed.best_for != "C5"].to_csv(path, index=False)
+    confirmed[confirmed.best_for != "trade-off C5"].to_csv(path, index=False)
     text = " ".join(reconstruction_text.best_list(published).split())
-    assert "Fresh seeds in the best readings for C5 are still to come." in text
+    assert "Fresh seeds in the best readings for C5, trade-off are still to come." in text
+    trade_off = " ".join(reconstruction_text.trade_off_list(published).split())
+    assert trade_off.endswith("reading 1 of the search agrees best with the text; its fresh seeds are still to come.")
     assert "support:" not in text
     rows = reconstruction_text.confirmed_table(published).splitlines()[2:]
-    assert "| C5 (highest) | 2 of 4 | 1, 0.5 (0.4 to 0.6): contradicted | to come |  |" in rows
+    assert "| C5 (highest) | 2 of 4 | 1, 0.5 (0.4 to 0.6): contradicted |  | to come |  |" in rows
 
 
 def test_a_search_that_began_without_a_multiverse_has_no_default_to_stand_beside(published):

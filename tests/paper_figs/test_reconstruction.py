@@ -8,6 +8,8 @@ import pandas as pd
 import pytest
 import worlds
 
+import jrcjax
+from jrcjax import exact
 from jrcjax.config.paths import parameter_at
 from jrcjax.readings import Loss
 from paper_figs.claims.table import CLAIMS as TABLE
@@ -67,6 +69,7 @@ def small_steps_only(monkeypatch):
     for name in ("generation_sweep", "confirmation_sweep"):
         monkeypatch.setattr(reconstruction, name, remember(getattr(reconstruction, name)))
     monkeypatch.setattr(reconstruction, "_verdicts", verdicts)
+    monkeypatch.setattr(reconstruction, "lost_by_one_action", lambda units: np.array([u[RATE] for u in units]))
     return seen
 
 
@@ -84,6 +87,10 @@ def test_the_search_finds_the_reading_and_confirms_it_with_other_seeds(small_ste
     assert small_steps_only[-1][1:] == (9, 2)
     confirmed = pd.read_csv(summary / "confirmed.csv")
     best = confirmed[confirmed.best_for.str.contains("all")]
+    worth = tried[tried.lost_by_one_action >= reconstruction.LEAST_LOSS]  # here the larger the steps the more
+    of_them = confirmed[confirmed.best_for.str.contains("trade-off")]
+    assert set(of_them.reading) == {worth.reading[worth.agreement.idxmax()]}
+    assert len(of_them) == len(best)
     assert best.promised[1:2].all()
     assert not best.holds[:2].any()  # what the search promised and fresh seeds did not give
     preset = preset_of(str(summary / reconstruction.PRESET_FILE))
@@ -123,7 +130,7 @@ def test_a_search_goes_on_from_the_verdicts_that_it_kept(small_steps_only, tmp_p
 
 
 def test_a_search_that_is_stopped_says_what_is_confirmed_so_far(small_steps_only, tmp_path, monkeypatch):
-    def two_of(tried):
+    def two_of(tried, lost):
         return [reconstruction.Choice(tried[0], (reconstruction.ALL,)), reconstruction.Choice(tried[1], ("C5",))]
 
     def run(sweep, size=SIZE):
@@ -175,7 +182,7 @@ def test_the_best_of_a_multiverse_are_starts_and_may_be_chosen(tmp_path):
     starts = reconstruction._starts(known, Effort(starts=2))
     np.testing.assert_array_equal(starts[0], unit_of(1, best)[0])  # and not the next, of the same block
     np.testing.assert_array_equal(starts[1], default_unit())
-    first, *_ = reconstruction.choice_of(known)
+    first, *_ = reconstruction.choice_of(known, np.zeros(len(known)))
     assert first.reading.name == f"multiverse {best}"
     assert first.best_for[0] == reconstruction.ALL
     assert first.reading.agreement == pytest.approx(10 / 15)
@@ -187,11 +194,35 @@ def tried_with(name, holds, values):
     return reconstruction.Tried(name, default_unit(), of)
 
 
+def test_one_action_loses_what_the_exact_solver_says_and_nothing_where_events_ignore_the_state():
+    params = jrcjax.paper_params("target")
+    best, constant = (
+        float(exact.evaluate_policy(params, policy(params)).reward)
+        for policy in (exact.optimal_policy, exact.best_constant_action)
+    )
+    without = default_unit()
+    without[[reading.path for reading in READINGS].index("env.event_model")] = 0.5  # marginal
+    lost = reconstruction.lost_by_one_action([default_unit(), without])
+    np.testing.assert_allclose(lost, [1 - constant / best, 0.0], rtol=1e-4, atol=1e-6)
+    assert lost[0] > reconstruction.LEAST_LOSS
+
+
+def test_the_best_reading_with_a_trade_off_is_confirmed_for_all_claims():
+    number = np.array([number_of(c.claim) for c in TABLE])
+    most, less = tried_with("most", number != "C15", 1.0), tried_with("less", number == "C14", 1.0)
+    least = tried_with("least", number == "none", 1.0)
+    choices = reconstruction.choice_of([most, least, less], np.array([0.0, 0.3, 0.02]))
+    (chosen,) = [choice for choice in choices if reconstruction.TRADE_OFF in choice.best_for]
+    assert chosen.reading.name == "less"
+    assert chosen.speaks_of(less.verdicts.claim).all()
+    assert choices[0].reading.name == "most"
+
+
 def test_a_reading_is_confirmed_where_it_is_the_best():
     number = np.array([number_of(c.claim) for c in TABLE])
     most = tried_with("most", number != "C15", 1.0)
     other = tried_with("other", number == "C15", 1.0)
-    for_all, for_one = choices = reconstruction.choice_of([most, other])
+    for_all, for_one = choices = reconstruction.choice_of([most, other], np.zeros(2))
     assert for_all.reading.name == "most"
     assert for_all.speaks_of(most.verdicts.claim).all()
     assert for_all.figures == {"fig5a", "fig5b", "fig6", "fig7", "fig8", "fig9"}
