@@ -18,7 +18,7 @@ from paper_figs.readings_text import FIGURES, NAMED, csv_of, share_of, short
 from paper_figs.studies import multiverse
 from paper_figs.studies.reconstruction import ALL, BEST, DEFAULT, LEAST_LOSS, TRADE_OFF
 from sweeps.studies.multiverse import MULTIVERSE
-from sweeps.studies.readings import READINGS, SOURCE, Reading
+from sweeps.studies.readings import READINGS, SOURCE
 from sweeps.studies.reconstruction import NAME
 
 _RARE = 0.05
@@ -97,30 +97,33 @@ def _optimum(folder: Path) -> tuple[float, float]:
 def trade_off_list(published: Path) -> str:
     """In how much of the space one action is not enough in the target, by which answers, and what fits best there."""
     tried, confirmed, _ = _tables(published)
-    sample, has = _of_multiverse(tried)
-    share, low, high = (percent(float(limit)) for limit in proportion_effect(has.sum(), len(sample)))
-    if not has.any():
-        return listed([f"One action in every state is optimal in the target of all {len(sample)} readings."])
-    least, elsewhere = sample.lost_by_one_action[has].min(), sample.lost_by_one_action[~has].max()
-    none = _answers_without(sample, has)
-    without = ~np.any([sample[r.path].astype(str) == answer for r, answer in none], axis=0) if none else has | True
-    fields = "; ".join(f"`{reading.path}` {answer}" for reading, answer in none) or "none"
+    worth, idle = _of_multiverse(tried)
+    number = len(worth) + len(idle)
+    if worth.empty:
+        return listed([f"One action in every state is optimal in the target of all {number} readings."])
+    share, low, high = (percent(float(limit)) for limit in proportion_effect(len(worth), number))
+    answers = _answers_without(worth, idle)
+    fields = "; ".join(f"`{path}` {answer}" for path, answer in answers) or "none"
+    left = [len(of) - np.count_nonzero(_has_one_of(answers, of)) for of in (worth, idle)]
     sentences = [
         f"In {share} ({low} to {high}) of the multiverse's readings the best action in every state loses part of what "
-        f"the target's optimal policy earns, at least {percent(least)}; in all others at most {percent(elsewhere)}.",
-        f"Answers with which no reading has a trade-off: {fields}. Of the {without.sum()} readings without them "
-        f"{(has & without).sum()} have one.",
+        f"the target's optimal policy earns, at least {percent(worth.lost_by_one_action.min())}; in all others at most "
+        f"{percent(idle.lost_by_one_action.max())}.",
+        f"Answers with which no reading has a trade-off: {fields}. Of the {sum(left)} readings without them {left[0]} "
+        "have one.",
         "On their side in readings with a trade-off, and in those without one: "
-        f"{_by_trade_off(published, sample, has)}.",
+        + "; ".join(f"{c} in {_held(published, worth, c)} and {_held(published, idle, c)}" for c in NAMED)
+        + ".",
         _best_with_trade_off(tried, _for(confirmed, TRADE_OFF)),
     ]
     return listed(sentences)
 
 
-def _by_trade_off(published: Path, sample: pd.DataFrame, has: pd.Series) -> str:
-    """In which share of the multiverse's readings with a trade-off, and of those without, the headlines hold."""
-    shares = ((claim, *(_held(published, sample[which], claim) for which in (has, ~has))) for claim in NAMED)
-    return "; ".join(f"{claim} in {with_one} and {without}" for claim, with_one, without in shares)
+def _of_multiverse(tried: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """The readings that no search proposed: those with a trade-off, and those without."""
+    sample = tried.loc[~tried.reading.str.startswith("search")]
+    has = sample.lost_by_one_action >= LEAST_LOSS
+    return sample.loc[has], sample.loc[~has]
 
 
 def _held(published: Path, sample: pd.DataFrame, claim: str) -> str:
@@ -130,39 +133,34 @@ def _held(published: Path, sample: pd.DataFrame, claim: str) -> str:
     return share_of(found.holds[of_sample].astype(bool))
 
 
-def _of_multiverse(tried: pd.DataFrame) -> tuple[pd.DataFrame, pd.Series]:
-    """The readings that no search proposed, and which of them have a trade-off."""
-    sample = tried[~tried.reading.str.startswith("search")]
-    return sample, sample.lost_by_one_action >= LEAST_LOSS
-
-
 def _number(reading: str) -> int:
     """The number in the multiverse of a reading of it."""
     return 0 if reading == DEFAULT else int(reading.rpartition(" ")[2])
 
 
-def _answers_without(sample: pd.DataFrame, has: pd.Series) -> list[tuple[Reading, str]]:
-    """The answers to questions, of a few answers each, with which no reading has a trade-off."""
+def _answers_without(worth: pd.DataFrame, idle: pd.DataFrame) -> list[tuple[str, str]]:
+    """The answers to questions, of a few answers each, with which no reading has a trade-off; by field."""
     found = []
     for reading in READINGS:
-        answers = sample[reading.path].astype(str)
-        if 1 < answers.nunique() <= _FEW:
-            found += [(reading, answer) for answer in answers.unique() if not has[answers == answer].any()]
+        with_one, without = (set(of[reading.path].astype(str)) for of in (worth, idle))
+        if len(with_one | without) <= _FEW:
+            found += [(reading.path, answer) for answer in sorted(without - with_one)]
     return found
+
+
+def _has_one_of(answers: list[tuple[str, str]], sample: pd.DataFrame) -> np.ndarray:
+    return np.any([sample[path].astype(str) == answer for path, answer in answers] or [[False] * len(sample)], axis=0)
 
 
 def _best_with_trade_off(tried: pd.DataFrame, best: pd.DataFrame) -> str:
     """What agrees best with the text of the readings with a trade-off, and what fresh seeds say of it."""
-    worth = tried[tried.lost_by_one_action >= LEAST_LOSS]
-    of_them = f"Of all {len(worth)} readings with a trade-off, those of the search included,"
+    number, name = int((tried.lost_by_one_action >= LEAST_LOSS).sum()), _with_trade_off(tried)
+    agrees = f"Of all {number} readings with a trade-off, those of the search included, {_named(name)} agrees best with"
     if best.empty:
-        name = worth.reading[worth.agreement.idxmax()]
-        return f"{of_them} {_named(name)} agrees best with the text; its fresh seeds are still to come."
-    name = best.reading.iloc[0]
-    agreement = worth.agreement[worth.reading == name].iloc[0]
+        return f"{agrees} the text; its fresh seeds are still to come."
     return (
-        f"{of_them} {_named(name)} agrees best with the text: its single seed promised {int(best.promised.sum())} of "
-        f"{len(best)} statements (agreement {percent(agreement)}), and {int(best.n_seeds.max())} fresh seeds gave "
+        f"{agrees} the text: its single seed promised {int(best.promised.sum())} of {len(best)} statements (agreement "
+        f"{percent(tried.set_index('reading').agreement[name])}), and {int(best.n_seeds.max())} fresh seeds gave "
         f"{int(best.holds.sum())} (agreement {percent(multiverse.agreement(best).mean())}): {_count(best)}. "
         f"Supported: {_names(best.claim[best.verdict == 'supported'])}."
     )
@@ -196,17 +194,20 @@ def _world_in_short(published: Path) -> str:
 
 def _trade_off_in_short(published: Path, tried: pd.DataFrame, confirmed: pd.DataFrame) -> str:
     """How many readings have a trade-off, whether C3 holds in them, and which fits the text best."""
-    sample, has = _of_multiverse(tried)
-    worth, best = tried[tried.lost_by_one_action >= LEAST_LOSS], _for(confirmed, TRADE_OFF)
-    if not has.any():
+    (worth, idle), best = _of_multiverse(tried), _for(confirmed, TRADE_OFF)
+    if worth.empty:
         return "No reading of the multiverse has a trade-off in the target."
     page, claim = _PAGE.replace("the-best-reading", "where-there-is-a-trade-off"), NAMED[0]
-    share, fresh = percent(has.mean()), "fresh seeds to come" if best.empty else f"{_count(best)}"
+    share, fresh = len(worth) / (len(worth) + len(idle)), "fresh seeds to come" if best.empty else _count(best)
     return (
-        f"{share} of the multiverse have [a trade-off]({page}) in the target: there {claim} holds in "
-        f"{_held(published, sample[has], claim)}, and {_named(worth.reading[worth.agreement.idxmax()])} fits best "
-        f"({fresh})."
+        f"{percent(share)} of the multiverse have [a trade-off]({page}) in the target: there {claim} holds in "
+        f"{_held(published, worth, claim)}, and {_named(_with_trade_off(tried))} fits best ({fresh})."
     )
+
+
+def _with_trade_off(tried: pd.DataFrame) -> str:
+    """The reading that agrees most with the text of those with a trade-off."""
+    return str(tried.reading[tried.agreement.where(tried.lost_by_one_action >= LEAST_LOSS).idxmax()])
 
 
 def best_list(published: Path) -> str:
