@@ -198,7 +198,9 @@ def _trade_off_in_short(published: Path, tried: pd.DataFrame, confirmed: pd.Data
     if worth.empty:
         return "No reading of the multiverse has a trade-off in the target."
     page, claim = _PAGE.replace("the-best-reading", "where-there-is-a-trade-off"), NAMED[0]
-    share, fresh = len(worth) / (len(worth) + len(idle)), "fresh seeds to come" if best.empty else _count(best)
+    share, fresh = len(worth) / (len(worth) + len(idle)), "fresh seeds to come"
+    if not best.empty:
+        fresh = f"{_count(best)}; {claim} {', '.join(best.verdict[best.claim == claim]) or 'unknown'}"
     return (
         f"{percent(share)} of the multiverse have [a trade-off]({page}) in the target: there {claim} holds in "
         f"{_held(published, worth, claim)}, and {_named(_with_trade_off(tried))} fits best ({fresh})."
@@ -263,12 +265,12 @@ def _unconfirmed(confirmed: pd.DataFrame, closest: pd.DataFrame) -> list[str]:
 
 
 def best_values_table(published: Path) -> str:
-    """The best reading, answer by answer, beside the default."""
+    """The best readings, answer by answer, beside the default."""
     tried, confirmed, _ = _tables(published)
     by_name = tried.set_index("reading")
-    best = by_name.loc[_for(confirmed, ALL).reading.iloc[0]]
-    rows = [(f"`{r.path}`", r.label, short(by_name[r.path].get(DEFAULT, "")), short(best[r.path])) for r in READINGS]
-    return table(("field", "question", "default", "best reading"), rows)
+    names = (DEFAULT, _for(confirmed, ALL).reading.iloc[0], _with_trade_off(tried))
+    rows = [(f"`{r.path}`", r.label, *(short(by_name.loc[name, r.path]) for name in names)) for r in READINGS]
+    return table(("field", "question", "default", "best for all", "best with a trade-off"), rows)
 
 
 def confirmed_table(published: Path) -> str:

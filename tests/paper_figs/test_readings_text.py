@@ -168,7 +168,7 @@ def test_promise_and_confirmation_stand_side_by_side(published):
     assert "| C11 | 0 of 4 | 1, -1 (-2 to 0): undecided |  | search 0 | 1, -1 (-2 to 0): undecided |" in rows
     values = reconstruction_text.best_values_table(published).splitlines()[2:]
     assert len(values) == len(READINGS)
-    assert f"| `{READINGS[0].path}` | {STEP} | 0.5 | 0.25 |" in values
+    assert f"| `{READINGS[0].path}` | {STEP} | 0.5 | 0.25 | 0.5 |" in values
 
 
 def test_where_there_is_a_trade_off_and_what_fits_best_there(published):
@@ -188,7 +188,9 @@ def test_the_first_page_says_how_many_readings_have_a_trade_off(published):
     text = " ".join(reconstruction_text.search_list(published).split())
     assert "loses up to 25 % in it at the points of Figs. 6 to 8 (default: it loses up to 25 %). 50 % of the" in text
     assert "where-there-is-a-trade-off) in the target: there C3 (TLwD) holds in 0 % (0 to 95), and" in text
-    assert " and reading 1 of the search fits best (1 supported, 1 contradicted, 0 undecided)." in text
+    assert (
+        " and reading 1 of the search fits best (1 supported, 1 contradicted, 0 undecided; C3 (TLwD) unknown)." in text
+    )
 
 
 def test_a_space_without_a_trade_off(published):
