@@ -158,11 +158,12 @@ def _best_with_trade_off(tried: pd.DataFrame, best: pd.DataFrame) -> str:
     agrees = f"Of all {number} readings with a trade-off, those of the search included, {_named(name)} agrees best with"
     if best.empty:
         return f"{agrees} the text; its fresh seeds are still to come."
+    values, supported = tried.set_index("reading").loc[name].to_dict(), best.claim[best.verdict == "supported"]
     return (
         f"{agrees} the text: its single seed promised {int(best.promised.sum())} of {len(best)} statements (agreement "
-        f"{percent(tried.set_index('reading').agreement[name])}), and {int(best.n_seeds.max())} fresh seeds gave "
-        f"{int(best.holds.sum())} (agreement {percent(multiverse.agreement(best).mean())}): {_count(best)}. "
-        f"Supported: {_names(best.claim[best.verdict == 'supported'])}."
+        f"{percent(values['agreement'])}), and {int(best.n_seeds.max())} fresh seeds gave {int(best.holds.sum())} "
+        f"(agreement {percent(multiverse.agreement(best).mean())}): {_count(best)}. {_pair(values)} Supported: "
+        f"{_names(supported)}."
     )
 
 

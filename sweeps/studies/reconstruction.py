@@ -20,7 +20,7 @@ NAME = "reconstruction"
 STARTS = 3
 """Readings with different code that the search starts from."""
 _MOST = 2**20
-_CONFIRMED_PER_PART = 32  # a reading alone has few points, and one source agent per seed: this fills two cores with both
+_CONFIRMED_PER_PART = 32  # a reading alone has few points, and a source agent per seed; both fill two cores
 
 
 @dataclass(frozen=True)
