@@ -148,6 +148,9 @@ def _check_exponential(hparams: HParams) -> None:
             refuse(f"hparams.{name}", 0.0, "a probability > 0, where epsilon falls exponentially")
 
 
+_MOST_TRANSITIONS = 10**9  # a sum tree over them has a third more values, which are numbered in 32 bits
+
+
 def check_config(config: Config) -> None:
     """Checks static settings.
 
@@ -157,6 +160,7 @@ def check_config(config: Config) -> None:
     require_type("config", config, Config)
     for name in ("episodes", "batch_size", "replay_capacity", "demonstrations", "pretraining", "n_step"):
         require_integer(f"config.{name}", getattr(config, name), 0 if name == "pretraining" else 1)
+    require_integer("config.replay_capacity", config.replay_capacity, 1, _MOST_TRANSITIONS)
     if not isinstance(config.hidden, tuple):
         refuse("config.hidden", repr(config.hidden), "a tuple of Python ints >= 1")
     for width in config.hidden:
