@@ -106,8 +106,8 @@ def trade_off_list(published: Path) -> str:
     fields = "; ".join(f"`{path}` {answer}" for path, answer in answers) or "none"
     left = [len(of) - np.count_nonzero(_has_one_of(answers, of)) for of in (worth, idle)]
     sentences = [
-        f"In {share} ({low} to {high}) of the multiverse's readings the best action in every state loses part of what "
-        f"the target's optimal policy earns, at least {percent(worth.lost_by_one_action.min())}; in all others at most "
+        f"In {share} ({low} to {high}) of the multiverse's readings no single action is optimal in the target: the best "
+        f"one loses at least {percent(worth.lost_by_one_action.min())}; in all others at most "
         f"{percent(idle.lost_by_one_action.max())}.",
         f"Answers with which no reading has a trade-off: {fields}. Of the {sum(left)} readings without them {left[0]} "
         "have one.",
@@ -122,8 +122,8 @@ def trade_off_list(published: Path) -> str:
 def _of_multiverse(tried: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
     """The readings that no search proposed: those with a trade-off, and those without."""
     sample = tried.loc[~tried.reading.str.startswith("search")]
-    has = sample.lost_by_one_action >= LEAST_LOSS
-    return sample.loc[has], sample.loc[~has]
+    worth = _worth(sample)
+    return worth, sample.drop(worth.index)
 
 
 def _held(published: Path, sample: pd.DataFrame, claim: str) -> str:
@@ -154,7 +154,7 @@ def _has_one_of(answers: list[tuple[str, str]], sample: pd.DataFrame) -> np.ndar
 
 def _best_with_trade_off(tried: pd.DataFrame, best: pd.DataFrame) -> str:
     """What agrees best with the text of the readings with a trade-off, and what fresh seeds say of it."""
-    number, name = int((tried.lost_by_one_action >= LEAST_LOSS).sum()), _with_trade_off(tried)
+    number, name = len(_worth(tried)), _with_trade_off(tried)
     agrees = f"Of all {number} readings with a trade-off, those of the search included, {_named(name)} agrees best with"
     if best.empty:
         return f"{agrees} the text; its fresh seeds are still to come."
@@ -210,7 +210,12 @@ def _trade_off_in_short(published: Path, tried: pd.DataFrame, confirmed: pd.Data
 
 def _with_trade_off(tried: pd.DataFrame) -> str:
     """The reading that agrees most with the text of those with a trade-off."""
-    return str(tried.reading[tried.agreement.where(tried.lost_by_one_action >= LEAST_LOSS).idxmax()])
+    return str(tried.reading[_worth(tried).agreement.idxmax()])
+
+
+def _worth(tried: pd.DataFrame) -> pd.DataFrame:
+    """The readings with a trade-off."""
+    return tried.loc[tried.lost_by_one_action >= LEAST_LOSS]
 
 
 def best_list(published: Path) -> str:
@@ -230,7 +235,7 @@ def best_list(published: Path) -> str:
         _nowhere(tried, closest) or f"Each statement's estimate is on its side in some of the {len(tried)} readings.",
         f"In less than {percent(_RARE)} of them: {_names(rare.claim)}.",
     ]
-    wanted = [*confirmed.number.unique(), *([TRADE_OFF] if (tried.lost_by_one_action >= LEAST_LOSS).any() else [])]
+    wanted = [*confirmed.number.unique(), *([] if _worth(tried).empty else [TRADE_OFF])]
     if to_come := [what for what in wanted if _for(confirmed, what).empty]:
         return listed([*sentences, f"Fresh seeds in the best readings for {', '.join(to_come)} are still to come."])
     sentences += [

@@ -148,9 +148,6 @@ def _check_exponential(hparams: HParams) -> None:
             refuse(f"hparams.{name}", 0.0, "a probability > 0, where epsilon falls exponentially")
 
 
-_MOST_TRANSITIONS = 10**9  # a sum tree over them has a third more values, which are numbered in 32 bits
-
-
 def check_config(config: Config) -> None:
     """Checks static settings.
 
@@ -158,9 +155,10 @@ def check_config(config: Config) -> None:
       ValueError: naming the field, the value and what is allowed.
     """
     require_type("config", config, Config)
-    for name in ("episodes", "batch_size", "replay_capacity", "demonstrations", "pretraining", "n_step"):
+    for name in ("episodes", "batch_size", "demonstrations", "pretraining", "n_step"):
         require_integer(f"config.{name}", getattr(config, name), 0 if name == "pretraining" else 1)
-    require_integer("config.replay_capacity", config.replay_capacity, 1, _MOST_TRANSITIONS)
+    # A sum tree over the transitions has a third more values, which are numbered in 32 bits.
+    require_integer("config.replay_capacity", config.replay_capacity, 1, 10**9)
     if not isinstance(config.hidden, tuple):
         refuse("config.hidden", repr(config.hidden), "a tuple of Python ints >= 1")
     for width in config.hidden:

@@ -44,7 +44,7 @@ ALL = "all"
 TRADE_OFF = "trade-off"
 """What the reading is the best for that agrees most of those with a trade-off."""
 LEAST_LOSS = 0.01
-"""Share of the optimum that the best action in every state loses at least in a target with a trade-off."""
+"""A target has a trade-off if the best policy that ignores the state loses this share of the optimum or more."""
 
 
 class Tried(NamedTuple):
@@ -90,16 +90,13 @@ def search(effort: Effort, size: Size, out: Path, run: Callable[..., Path]) -> l
     tried = known + found
     lost = lost_by_one_action([one.unit for one in tried])
     chosen, fresh = choice_of(tried, lost), of_seeds(size, size.seeds + effort.confirm)
+    tables = {"tried": tried_table(tried, lost), "closest": closest_table(tried)}
     confirmed, written = [], []
     for choice in chosen:
         sweep = confirmation_sweep(choice.reading.unit, choice.figures)
         confirmed += _kept(sweep, fresh, out, run, first_seed=size.seeds)
         # Each reading takes long, so the summary says what is confirmed so far.
-        tables = {
-            "tried": tried_table(tried, lost),
-            "confirmed": confirmed_table(chosen[: len(confirmed)], confirmed),
-            "closest": closest_table(tried),
-        }
+        tables["confirmed"] = confirmed_table(chosen[: len(confirmed)], confirmed)
         written = _write(out / NAME / "summary", tables, chosen[0].reading)
     return written
 
@@ -176,7 +173,7 @@ def _starts(known: list[Tried], effort: Effort) -> list[np.ndarray]:
 
 
 def lost_by_one_action(units: Sequence[np.ndarray]) -> np.ndarray:
-    """The share of the optimum that the best action in every state loses in the target as it is, exact, [readings].
+    """The share of the optimum that the best policy that ignores the state loses in the target, exact, [readings].
 
     Where it is 0 radar and data are no trade-off: an agent that ignores what it observes is optimal.
     """

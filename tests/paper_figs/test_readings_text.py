@@ -174,7 +174,9 @@ def test_promise_and_confirmation_stand_side_by_side(published):
 def test_where_there_is_a_trade_off_and_what_fits_best_there(published):
     text = " ".join(reconstruction_text.trade_off_list(published).split())
     assert "In 50 % (" in text  # of the default and one reading of a multiverse
-    assert "earns, at least 8 %; in all others at most 0 %." in text
+    assert (
+        "no single action is optimal in the target: the best one loses at least 8 %; in all others at most 0 %." in text
+    )
     assert "no reading has a trade-off: `env.reward_state` episode_start. Of the 1 readings without them 1 have" in text
     assert (
         "Of all 2 readings with a trade-off, those of the search included, reading 1 of the search agrees best" in text
