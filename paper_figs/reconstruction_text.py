@@ -106,8 +106,8 @@ def trade_off_list(published: Path) -> str:
     fields = "; ".join(f"`{path}` {answer}" for path, answer in answers) or "none"
     left = [len(of) - np.count_nonzero(_has_one_of(answers, of)) for of in (worth, idle)]
     sentences = [
-        f"In {share} ({low} to {high}) of the multiverse's readings no single action is optimal in the target: the best "
-        f"one loses at least {percent(worth.lost_by_one_action.min())}; in all others at most "
+        f"In {share} ({low} to {high}) of the multiverse's readings no single action is optimal in the target: the "
+        f"best one loses at least {percent(worth.lost_by_one_action.min())}; in all others at most "
         f"{percent(idle.lost_by_one_action.max())}.",
         f"Answers with which no reading has a trade-off: {fields}. Of the {sum(left)} readings without them {left[0]} "
         "have one.",
