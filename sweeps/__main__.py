@@ -59,6 +59,9 @@ class Run:
     with --smoke."""
     first: int = 0
     """Of the multiverse, the first reading to run, a multiple of 64."""
+    per_block: int = 64
+    """Of the multiverse, how many readings of each block of 64, within which all have the same answers to what decides
+    code; with few, more seeds go to readings from everywhere in the space."""
     keep: bool = False
     """Of the multiverse, keep what the summary in OUT/multiverse/summary, which an earlier run wrote, says of other
     readings."""
@@ -150,10 +153,12 @@ def _study(command: Run, preset: str) -> Study:
     from sweeps.studies.registry import EVERY_SWEEP, STUDIES
 
     of_readings = (multiverse.MULTIVERSE.name, reconstruction.NAME)
-    limited = {"readings": of_readings, "confirm": of_readings[1:]} | dict.fromkeys(("first", "keep"), of_readings[:1])
+    limited = {"readings": of_readings, "confirm": of_readings[1:]} | dict.fromkeys(
+        ("first", "per_block", "keep"), of_readings[:1]
+    )
     for option, names in limited.items():
         if getattr(command, option) != getattr(Run, option) and command.name not in names:
-            refuse("name", command.name, f"{' or '.join(names)}, for which alone --{option} is")
+            refuse("name", command.name, f"{' or '.join(names)}, for which alone --{option.replace('_', '-')} is")
     if command.name == CUSTOM:
         sweep = custom_sweep(command.custom, preset, (*STUDIES, *EVERY_SWEEP))
         return Study(CUSTOM, sweep.description, (sweep,), summary="paper_figs.studies.custom:summarise")
@@ -161,7 +166,7 @@ def _study(command: Run, preset: str) -> Study:
     if given:
         refuse("name", command.name, f"{CUSTOM}, for which alone --{given[0].replace('_', '-')} is")
     if command.name == multiverse.MULTIVERSE.name:
-        return multiverse.study_of(command.readings, command.smoke, command.first)
+        return multiverse.study_of(command.readings, command.smoke, command.first, command.per_block)
     return STUDIES[command.name]
 
 

@@ -14,6 +14,7 @@ from jrcjax.config.paths import DISTRIBUTIONS, Entry, Parameter, Points, leaf_of
 from jrcjax.containers import Container
 from jrcjax.learners.hparams import Config, check_config, check_hparams
 from jrcjax.model.params import check_params
+from jrcjax.radar.modes import Modes
 
 
 class Values(NamedTuple):
@@ -32,7 +33,7 @@ def stacked(base: Points, columns: Sequence[Values], number: int) -> Points:
     Raises:
       ValueError: naming the field, the value and what is allowed.
     """
-    of_radar = [c for c in columns if c.parameter.entries[0].fields[0] == "radar"]
+    of_radar = [c for c in columns if _is_of_radar(c)]
     others = [c for c in columns if c not in of_radar and c.parameter.container != "config"]
     bare = base._replace(params=_with(base.params, radar=jnp.zeros(())))
     points = jax.tree.map(lambda leaf: np.broadcast_to(leaf, (number, *np.shape(leaf))), bare)
@@ -46,7 +47,15 @@ def stacked(base: Points, columns: Sequence[Values], number: int) -> Points:
         params, hparams = jax.tree.map(lambda leaf, i=i: leaf[i], points)
         check_params(params)
         check_hparams(hparams)
-    return jax.tree.map(jnp.asarray, points)
+    return jax.device_put(points)  # unlike jnp.asarray it compiles nothing for each shape
+
+
+def shapes(base: Points, columns: Sequence[Values], number: int) -> Points:
+    """Shapes and types of `stacked`, without the banks of placements, which take seconds to draw."""
+    of_radar = [c for c in columns if _is_of_radar(c)]
+    modes = [_radar(base.params.radar.modes, of_radar, row) for row in _different(of_radar, number)[0]]
+    point = base._replace(params=_with(base.params, radar=_with(base.params.radar, max_objects=_room(modes))))
+    return jax.tree.map(lambda leaf: jax.ShapeDtypeStruct((number, *leaf.shape), leaf.dtype), point)
 
 
 def with_value(point: Points, parameter: Parameter, value: float) -> Points:
@@ -82,20 +91,37 @@ def _replaced(container: Any, fields: tuple[str, ...], leaf: Any) -> Any:
 
 def _radars(base: Points, columns: list[Values], number: int) -> Any:
     """The radars of all points, each that differs built once, with room for as many objects as the densest needs."""
-    rows = np.stack([column.at for column in columns], axis=1) if columns else np.zeros((number, 0))
-    different, which = np.unique(rows, axis=0, return_inverse=True, equal_nan=True)
-    radars = [_radar(base, columns, row) for row in different]
-    room = tuple(int(most) for most in np.max([radar.max_objects for radar in radars], axis=0))
+    different, which = _different(columns, number)
+    radars = [_radar(base.params.radar, columns, row) for row in different]
+    room = _room(radars)
     roomy = [_with(radar, max_objects=room) for radar in radars]
     whole = jax.tree.map(lambda *leaves: np.stack(leaves), *roomy)
-    return jax.tree.map(lambda leaf: leaf[which.reshape(-1)], whole)
+    return jax.tree.map(lambda leaf: leaf[which], whole)
 
 
-def _radar(base: Points, columns: list[Values], row: np.ndarray) -> Any:
-    radar, changes = base.params.radar, {}
+def _is_of_radar(column: Values) -> bool:
+    return column.parameter.entries[0].fields[0] == "radar"
+
+
+def _different(columns: list[Values], number: int) -> tuple[np.ndarray, np.ndarray]:
+    """The rows of values that differ, and which of them each point has."""
+    rows = np.stack([column.at for column in columns], axis=1) if columns else np.zeros((number, 0))
+    different, which = np.unique(rows, axis=0, return_inverse=True, equal_nan=True)
+    return different, which.reshape(-1)
+
+
+def _room(radars: Sequence[Modes]) -> tuple[int, ...]:
+    return tuple(int(most) for most in np.max([radar.max_objects for radar in radars], axis=0))
+
+
+def _radar(radar: Any, columns: list[Values], row: np.ndarray) -> Any:
+    """A radar, or its modes alone, with the values of one point."""
+    changes = {}
     for column, value in zip(columns, row, strict=True):
         entry = column.parameter.entries[0]
         name = entry.fields[1]
+        if not hasattr(radar, name):  # the seed of a bank
+            continue
         held = np.asarray(changes.get(name, getattr(radar, name)))
         changes[name] = _changed(held[None], entry, np.array([value]))[0]
     changes = {name: value for name, value in changes.items() if not np.array_equal(value, getattr(radar, name))}

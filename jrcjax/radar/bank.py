@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from collections.abc import Callable
 from typing import Any
 
 import jax
@@ -24,7 +25,8 @@ from jrcjax.radar.placement import Footprints
 from jrcjax.types import Key, Words
 
 PLACEMENTS = ("bank", "fresh")
-_CHUNK = 256  # placements handled at once while a bank is built: about 10 MB of boxes
+_CHUNK = {"cpu": 16}  # placements handled at once while a bank is built: their boxes stay in a core's cache
+_ACCELERATOR_CHUNK = 256
 _MOST_PLACED = 2**28  # objects in all placements of a bank: about a minute of work
 _KNOWN_BANKS = 256  # a bank of two modes takes 32 kB
 
@@ -102,15 +104,24 @@ class _Described:
 
 @functools.lru_cache(_KNOWN_BANKS)
 def _known_bank(described: _Described) -> Array:
-    with jax.ensure_compile_time_eval():  # kept banks are numbers, also if a trace asks first
-        return _build(described.modes, described.seed, described.size)
+    leaves, structure = jax.tree.flatten((described.modes, described.seed))
+    shapes = tuple(jax.ShapeDtypeStruct(leaf.shape, leaf.dtype) for leaf in leaves)
+    return _compiled(structure, shapes, described.size)(described.modes, described.seed)
+
+
+@functools.cache
+def _compiled(structure: Any, shapes: tuple[jax.ShapeDtypeStruct, ...], size: int) -> Callable[[Modes, Array], Array]:
+    """`_build` ready to run: kept banks are numbers, also if a trace asks first."""
+    return _build.lower(*jax.tree.unflatten(structure, shapes), size).compile()
 
 
 @jax.jit(static_argnums=2)
 def _build(modes: Modes, seed: Array, size: int) -> Array:
+    chunk = min(size, _CHUNK.get(jax.default_backend(), _ACCELERATOR_CHUNK))
+
     def of_mode(mode: int) -> Array:
         keys = jax.vmap(lambda i: bank_key(seed, mode, i))(jnp.arange(size))
-        return jax.lax.map(lambda key: fresh_miss_ratio(key, mode, modes), keys, batch_size=min(size, _CHUNK))
+        return jax.lax.map(lambda key: fresh_miss_ratio(key, mode, modes), keys, batch_size=chunk)
 
     return jnp.stack([of_mode(mode) for mode in range(modes.num_modes)])
 

@@ -172,7 +172,7 @@ def group_size(count: int) -> int:
 
 def _taken(leaf: Any, rows: np.ndarray) -> Any:
     if isinstance(leaf, jax.Array) and jnp.issubdtype(leaf.dtype, jax.dtypes.prng_key):
-        data = jnp.asarray(np.asarray(jax.random.key_data(leaf))[rows])
+        data = jax.device_put(np.asarray(jax.random.key_data(leaf))[rows])
         return jax.random.wrap_key_data(data, impl=jax.random.key_impl(leaf))
     return np.asarray(leaf)[rows]
 

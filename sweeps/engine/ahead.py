@@ -48,7 +48,7 @@ class Ahead:
 
     def _of_group(self, job: Job, group: Group, seeds: range) -> list[Future]:
         program = program_of(job.sweep.learners, job.spec, group.config, chunk_of(group.config.episodes))
-        table, lanes = job.table, _lanes(job, group, seeds)
+        table, lanes = job.shapes, _lanes(job, group, seeds)
         if (key := (program, str(jax.tree.map(jnp.shape, (table, lanes))))) in self._known:
             return []
         self._known.add(key)
@@ -76,8 +76,8 @@ def _like_sources(job: Job) -> Any:
     group = job.groups[0]
     program = program_of(job.sweep.learners, job.spec, group.config, chunk_of(group.config.episodes))
     keys, _, points = lanes = _lanes(job, group, range(1))  # their number does not matter
-    agents = program.start.eval_shape(job.table, lanes)
-    handed_on = hand_on(job.spec, group.config).eval_shape(job.table, (keys, points, agents["ddqn"].learner))
+    agents = program.start.eval_shape(job.shapes, lanes)
+    handed_on = hand_on(job.spec, group.config).eval_shape(job.shapes, (keys, points, agents["ddqn"].learner))
     return jax.tree.map(lambda leaf: jax.ShapeDtypeStruct(leaf.shape[1:], leaf.dtype), handed_on)
 
 

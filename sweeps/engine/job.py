@@ -10,12 +10,11 @@ from functools import cached_property
 from typing import NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from jrcjax.checks import refuse
 from jrcjax.config.paths import Points, parameter_at
-from jrcjax.config.stacking import Values, settings, stacked
+from jrcjax.config.stacking import Values, settings, shapes, stacked
 from jrcjax.learners import Learner, Spec, make_learner
 from jrcjax.learners.hparams import Config
 from jrcjax.machine import physical_memory
@@ -78,6 +77,12 @@ class Job:
     def table(self) -> Points:
         """The points as programs take them: the last repeated up to a power of two, so that sweeps share programs."""
         return _table(*self._of_points)
+
+    @property
+    def shapes(self) -> Points:
+        """Shapes of the table, known at once."""
+        base = base_of(self.sweep.environment, self.size.preset).points
+        return shapes(base, self.columns, len(_rows(len(self.sweep.design))))
 
     @property
     def _of_points(self) -> tuple[str, Design, tuple[tuple[str, float], ...], str]:
@@ -144,7 +149,11 @@ def _stacked(environment: str, design: Design, fixed: tuple[tuple[str, float], .
 
 @functools.lru_cache(maxsize=32)
 def _table(environment: str, design: Design, fixed: tuple[tuple[str, float], ...], preset: str) -> Points:
-    number = len(design)
-    rows = np.minimum(np.arange(max(_LEAST_ROOM, 2 ** (number - 1).bit_length())), number - 1)
-    points = _stacked(environment, design, fixed, preset)
-    return jax.tree.map(lambda leaf: leaf if len(leaf) == 1 else jnp.asarray(np.asarray(leaf)[rows]), points)
+    points, rows = _stacked(environment, design, fixed, preset), _rows(len(design))
+    return jax.device_put(jax.tree.map(lambda leaf: np.asarray(leaf)[rows], points))
+
+
+def _rows(number: int) -> np.ndarray:
+    """Which of so many points each row of a table holds; a single one is shared by all lanes."""
+    room = max(_LEAST_ROOM, 2 ** (number - 1).bit_length()) if number > 1 else 1
+    return np.minimum(np.arange(room), number - 1)

@@ -96,7 +96,7 @@ def program_of(learners: tuple[str, ...], spec: Spec, config: Config, chunk: int
 
 def keys_of(seeds: np.ndarray) -> Key:
     """Keys of seeds [N]: seed i has `fold_in(key(0), i)`, whatever other seeds there are."""
-    return jax.vmap(lambda i: jax.random.fold_in(jax.random.key(0), i))(jnp.asarray(seeds))
+    return jax.jit(jax.vmap(lambda i: jax.random.fold_in(jax.random.key(0), i)))(seeds)
 
 
 def lanes_of(job: Job, group: Group, seeds: range) -> Lanes:
@@ -109,7 +109,7 @@ def lanes_of(job: Job, group: Group, seeds: range) -> Lanes:
     point, seed = (a.reshape(-1) for a in np.indices(shape))
     keys = keys_of(np.array(seeds))
     of_seeds = jax.random.key_data(jax.vmap(target_key)(keys) if job.source else keys)
-    keys = jax.random.wrap_key_data(jnp.asarray(np.asarray(of_seeds)[seed]))
+    keys = jax.random.wrap_key_data(jax.device_put(np.asarray(of_seeds)[seed]))
     return Lanes(keys, np.array(group.rows)[point], seed, shape)
 
 
@@ -134,7 +134,7 @@ def _advance_group(job: Job, group: Group, lanes: Lanes, source: Source | None) 
     program = program_of(job.sweep.learners, job.spec, group.config, chunk)
     of_lane: Any = jax.tree.map(lambda leaf: np.asarray(leaf)[job.source_points[lanes.points], lanes.seeds], source)
     started = parallel.groups((lanes.keys, of_lane, lanes.points.astype(np.int32)))
-    batches = [(program.start(points, batch), jnp.asarray(batch[2])) for batch in started]
+    batches = [(program.start(points, batch), jax.device_put(batch[2])) for batch in started]
     del started
     for first in range(0, episodes, chunk):
         advanced = [program.advance((points, jnp.int32(first)), batch) for batch in batches]

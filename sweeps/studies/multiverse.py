@@ -124,18 +124,11 @@ def _source(values: Mapping[str, float]) -> dict[str, float]:
     return {path: value for path, value in own.items() if path.startswith("env.") or path in ALWAYS_SHARED}
 
 
-def sweeps_of(number: int, first: int = 0) -> tuple[Sweep, ...]:
-    """The blocks with readings `first` to `first + number`."""
+def sweeps_of(number: int, first: int = 0, per_block: int = PER_BLOCK) -> tuple[Sweep, ...]:
+    """The blocks of readings `first` to `first + number`, with so many readings of each."""
     values = [values_at(unit) for unit in unit_of(number, first)]
-    blocks = range(first, first + number, PER_BLOCK)
-    return tuple(
-        block_sweep(
-            "multiverse",
-            range(b, min(b + PER_BLOCK, first + number)),
-            values[b - first :][:PER_BLOCK],
-        )
-        for b in blocks
-    )
+    blocks = [range(b, min(b + per_block, first + number)) for b in range(first, first + number, PER_BLOCK)]
+    return tuple(block_sweep("multiverse", of, [values[i - first] for i in of]) for of in blocks)
 
 
 MULTIVERSE = Study(
@@ -149,8 +142,8 @@ MULTIVERSE = Study(
 )
 
 
-def study_of(number: int | None, smoke: bool, first: int = 0) -> Study:
-    """The study of the readings from `first` on, up to so many in all.
+def study_of(number: int | None, smoke: bool, first: int = 0, per_block: int = PER_BLOCK) -> Study:
+    """The study of the readings from `first` on, up to so many in all, with so many of each block.
 
     Raises:
       ValueError: naming the argument, the value and what is allowed.
@@ -160,7 +153,8 @@ def study_of(number: int | None, smoke: bool, first: int = 0) -> Study:
     require_integer("readings", number, 1, _MOST)
     if first not in range(0, number, PER_BLOCK):
         refuse("first", first, f"a multiple of {PER_BLOCK} from 0 on, less than readings = {number}")
-    return MULTIVERSE.with_sweeps(sweeps_of(number - first, first))
+    require_integer("per_block", per_block, 1, PER_BLOCK)
+    return MULTIVERSE.with_sweeps(sweeps_of(number - first, first, per_block))
 
 
 def verdicts_file(out: Path) -> Path:

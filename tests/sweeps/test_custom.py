@@ -135,6 +135,28 @@ def test_densities_beyond_those_of_the_base_share_one_shape(environments, tmp_pa
     assert params.radar.max_objects[1] > base.radar.max_objects[1]
 
 
+@pytest.mark.parametrize(
+    "vary",
+    [
+        (f"env.speed.event_probability.high={TENTHS}",),
+        ("env.radar.density=10,40", "hparams.learning_rate=1e-4,1e-3"),
+        ("env.radar.bank_seed=0,1,2",),
+        ("config.n_step=1,10",),
+        ("env.radar.density=40",),
+    ],
+)
+def test_programs_can_be_compiled_before_a_bank_is_drawn(vary, environments, tmp_path, monkeypatch):
+    file = tmp_path / "short.toml"
+    jrcjax.save_params(file, environments["short-target"])
+    job = Job(custom_sweep(Options(vary=vary, base=str(file)), "paper"), SMOKE)
+    with monkeypatch.context() as without:
+        without.setattr("jrcjax.radar.bank._known_bank", lambda described: pytest.fail("a bank was drawn"))
+        shapes = job.shapes
+    wanted = jax.tree.map(lambda leaf: jax.ShapeDtypeStruct(leaf.shape, leaf.dtype), job.table)
+    assert jax.tree.structure(shapes) == jax.tree.structure(wanted)
+    assert jax.tree.leaves(shapes) == jax.tree.leaves(wanted)
+
+
 def three_level_roads(params):
     return params.replace(road=Factor(prior=(0.5, 0.3, 0.2), event_probability=(0.0, 0.1, 0.2)))
 
