@@ -12,6 +12,7 @@ import pandas as pd
 
 from jrcjax.readings import Loss
 from paper_figs.analysis.intervals import proportion_effect
+from paper_figs.claims.results import Rules
 from paper_figs.markdown import listed, percent, table
 from paper_figs.plots import style
 from paper_figs.studies import multiverse
@@ -73,12 +74,56 @@ def readings_list(published: Path) -> str:
         f"{name} holds in {_holds(by_name[name])}; decided most by {_deciding(sensitivity, name, 2)}." for name in NAMED
     ]
     sentences.append(_together(csv_of(published, MULTIVERSE.name, "verdicts")))
+    if judged := int(claims.judged.max()):
+        sentences.append(_verdicts_in_short(judged, by_name))
     about = (
         f"Shares of {number} readings ([tables](published/{MULTIVERSE.name})) in which the estimate is on the "
         "statement's side, with 95 %\nintervals, and total-order indices of what decides it; unknown is where no run "
         "converges:\n\n"
     )
     return about + listed(sentences)
+
+
+def _verdicts_in_short(judged: int, by_name: Mapping[Hashable, Mapping[Hashable, Any]]) -> str:
+    shares = (f"{n} {percent(by_name[n]['supported'])} and {percent(by_name[n]['contradicted'])}" for n in NAMED)
+    return (
+        f"In {judged} of them, which have seeds enough for a verdict, supported and contradicted are: "
+        f"{'; '.join(shares)} ([all](docs/explanation/readings.md#verdicts))."
+    )
+
+
+def judged_table(published: Path) -> str:
+    """One row per statement: shares of its verdicts in the readings that have seeds enough for one."""
+    claims = csv_of(published, MULTIVERSE.name, "claims")
+    names = (*multiverse.VERDICTS, "negligible")
+    rows = [
+        (row["claim"], *(_share(row, name) for name in names)) for row in claims.query("judged > 0").to_dict("records")
+    ]
+    return table(("statement", *names), rows)
+
+
+def judged_list(published: Path) -> str:
+    """What has a verdict, and what verdicts say in most readings."""
+    claims, verdicts = (csv_of(published, MULTIVERSE.name, name) for name in ("claims", "verdicts"))
+    judged = verdicts[verdicts.n_seeds >= Rules().least_seeds]
+    if judged.empty:
+        return listed([f"No reading has seeds enough for a verdict, which takes {Rules().least_seeds}."])
+    seeds = ", ".join(f"{n:.0f}" for n in sorted(judged.n_seeds.unique()))
+    mostly = {v: claims.claim[claims[f"{v}_low"] > 0.5] for v in ("supported", "contradicted")}
+    never = claims.claim[claims.supported == 0]
+    in_words = [
+        f"In more than half, interval included, {v}: {'; '.join(names) or 'none'}." for v, names in mostly.items()
+    ]
+    return listed(
+        [
+            f"{judged.reading.nunique()} of {verdicts.reading.nunique()} readings have {seeds} seeds each, and "
+            f"{len(judged)} verdicts: "
+            + ", ".join(f"{(judged.verdict == v).sum()} {v}" for v in multiverse.VERDICTS)
+            + ".",
+            *in_words,
+            f"Supported in none of them: {'; '.join(never) or 'none'}.",
+        ]
+    )
 
 
 def extremes_list(published: Path) -> str:
@@ -207,6 +252,8 @@ BLOCKS: dict[str, Callable[[Path], str]] = {
     "readings": readings_list,
     "extremes": extremes_list,
     "decided": decided_table,
+    "judged": judged_list,
+    "judged_table": judged_table,
     "questions": questions_table,
     "answers": answers_table,
     "huber": huber_list,

@@ -180,7 +180,8 @@ def search_list(published: Path) -> str:
         + (
             _nowhere(tried, closest)
             or f"Each statement's estimate holds in some reading, {rarest['claim']}'s in {rarest['holds']}."
-        ),
+        )
+        + f" Fresh seeds support {len(_supported(confirmed))} of {len(closest)} in some.",
     ]
     return listed(sentences)
 

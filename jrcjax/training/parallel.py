@@ -161,7 +161,6 @@ def groups(tree: Any) -> list[Any]:
     count = jax.tree.leaves(tree)[0].shape[0]
     size = group_size(count)
     rows = np.minimum(np.arange(padded(count)), count - 1).reshape(-1, size)
-    # On the host: as programs these would be compiled for every leaf and every number of agents.
     return [jax.tree.map(functools.partial(_taken, rows=of_group), tree) for of_group in rows]
 
 
@@ -171,10 +170,18 @@ def group_size(count: int) -> int:
 
 
 def _taken(leaf: Any, rows: np.ndarray) -> Any:
-    if isinstance(leaf, jax.Array) and jnp.issubdtype(leaf.dtype, jax.dtypes.prng_key):
-        data = jax.device_put(np.asarray(jax.random.key_data(leaf))[rows])
-        return jax.random.wrap_key_data(data, impl=jax.random.key_impl(leaf))
-    return np.asarray(leaf)[rows]
+    return on_host(lambda array: array[rows], leaf)
+
+
+def on_host(function: Callable[..., np.ndarray], *leaves: Any) -> Any:
+    """A NumPy function of arrays; of random keys it takes their data, and gives keys.
+
+    As programs such functions would be compiled for every shape, which waits for what is being compiled already.
+    """
+    if isinstance(leaves[0], jax.Array) and jnp.issubdtype(leaves[0].dtype, jax.dtypes.prng_key):
+        data = jax.device_put(on_host(function, *map(jax.random.key_data, leaves)))
+        return jax.random.wrap_key_data(data, impl=jax.random.key_impl(leaves[0]))
+    return function(*map(np.asarray, leaves))
 
 
 def over_agents(function: Callable, block: int | None = None, *, in_place: bool = False) -> Callable:

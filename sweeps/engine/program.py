@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array
 
 from jrcjax.config.paths import Points
 from jrcjax.learners import Source, Spec, make_learner
@@ -37,7 +38,11 @@ class Lanes(NamedTuple):
 
     def unpadded(self, tree: Any) -> Any:
         """Leaves [padded lanes, ...] as [points, seeds, ...]."""
-        return jax.tree.map(lambda leaf: leaf[: math.prod(self.shape)].reshape(*self.shape, *leaf.shape[1:]), tree)
+
+        def of_points(lanes: np.ndarray) -> np.ndarray:
+            return lanes[: math.prod(self.shape)].reshape(*self.shape, *lanes.shape[1:])
+
+        return jax.tree.map(lambda leaf: parallel.on_host(of_points, leaf), tree)
 
 
 class Chunk(NamedTuple):
@@ -96,7 +101,17 @@ def program_of(learners: tuple[str, ...], spec: Spec, config: Config, chunk: int
 
 def keys_of(seeds: np.ndarray) -> Key:
     """Keys of seeds [N]: seed i has `fold_in(key(0), i)`, whatever other seeds there are."""
-    return jax.jit(jax.vmap(lambda i: jax.random.fold_in(jax.random.key(0), i)))(seeds)
+    return _keys(seeds)
+
+
+@jax.jit
+def _keys(seeds: Array) -> Key:
+    return jax.vmap(lambda i: jax.random.fold_in(jax.random.key(0), i))(seeds)
+
+
+@jax.jit
+def _target_keys(keys: Key) -> Key:
+    return jax.vmap(target_key)(keys)
 
 
 def lanes_of(job: Job, group: Group, seeds: range) -> Lanes:
@@ -108,8 +123,7 @@ def lanes_of(job: Job, group: Group, seeds: range) -> Lanes:
     shape = (len(group.rows), len(seeds))
     point, seed = (a.reshape(-1) for a in np.indices(shape))
     keys = keys_of(np.array(seeds))
-    of_seeds = jax.random.key_data(jax.vmap(target_key)(keys) if job.source else keys)
-    keys = jax.random.wrap_key_data(jax.device_put(np.asarray(of_seeds)[seed]))
+    keys = parallel.on_host(lambda data: data[seed], _target_keys(keys) if job.source else keys)
     return Lanes(keys, np.array(group.rows)[point], seed, shape)
 
 
@@ -149,10 +163,4 @@ def joined(batches: list[Any]) -> Any:
     Joined on the devices they would be exchanged between them. A device waits for the other one, which may have other
     batches to advance first, and XLA gives up after a while.
     """
-
-    def join(*parts: Any) -> Any:
-        if jnp.issubdtype(parts[0].dtype, jax.dtypes.prng_key):
-            return jax.random.wrap_key_data(join(*map(jax.random.key_data, parts)))
-        return np.concatenate([np.asarray(part) for part in parts])
-
-    return jax.tree.map(join, *batches)
+    return jax.tree.map(lambda *parts: parallel.on_host(lambda *arrays: np.concatenate(arrays), *parts), *batches)

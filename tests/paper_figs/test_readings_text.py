@@ -21,7 +21,9 @@ def published(tmp_path):
     def share(claim, holds):
         limits = {"holds": holds, "holds_low": max(holds - 0.05, 0.0), "holds_high": min(holds + 0.05, 1.0)}
         limits["unknown"] = 0.3 if claim.startswith("C3") else 0.0
-        return {"claim": claim, "readings": 400} | limits
+        for name, of in {"supported": 0.0, "contradicted": 0.75, "undecided": 0.25, "negligible": 0.0}.items():
+            limits |= {name: of, f"{name}_low": of - 0.1, f"{name}_high": of + 0.1}
+        return {"claim": claim, "readings": 400, "judged": 2} | limits
 
     claims = [share(claim, 0.5) for claim in readings_text.NAMED] + [share("C2 (everywhere)", 0.99), share("C4", 0.01)]
     index = {"first": 0.1, "first_low": 0.0, "first_high": 0.2, "surrogate": "gaussian", "surrogate_error": 0.25}
@@ -62,6 +64,10 @@ def published(tmp_path):
     closest = [{"claim": claim, "tried": 4, "known": 4, "holds": held} for claim, held in holds.items()]
     steps = multiverse.places(41)[STEP]
     verdicts = [{"reading": n, "claim": "C3 (TLwD)", "holds": bool(steps[n] < 1 / 3)} for n in range(41)]
+    verdicts += [
+        {"reading": n, "claim": "C4", "holds": False, "verdict": verdict, "n_seeds": 5}
+        for n, verdict in ((7, "contradicted"), (9, "contradicted"), (11, "undecided"))
+    ]
     verdicts += [
         {"reading": n, "claim": claim, "holds": of.get("hparams.loss") == of.get(SOURCE) == 1}
         for claim in readings_text.TOGETHER
@@ -108,6 +114,38 @@ def test_shares_and_what_decides_are_those_of_the_tables(published):
     text = " ".join(readings_text.extremes_list(published).split())
     assert "hold 1 of 6 statements: C2 (everywhere)." in text
     assert "In less than 10 % of it hold 1: C4." in text
+
+
+def test_what_has_a_verdict_and_what_verdicts_say(published):
+    text = readings_text.judged_list(published)
+    assert text.startswith(
+        "- 3 of 41 readings have 5 seeds each, and 3 verdicts: 0 supported, 2 contradicted, 1 undecided."
+    )
+    everything = "; ".join(pd.read_csv(published / "multiverse" / "claims.csv").claim)
+    assert (
+        f"interval included, supported: none. - In more than half, interval included, contradicted: {everything}."
+        in (" ".join(text.split()))
+    )
+    assert f"Supported in none of them: {everything}." in " ".join(text.split())
+    assert "| C4 | 0 % (-10 to 10) | 75 % (65 to 85) | 25 % (15 to 35) | 0 % (-10 to 10) |" in (
+        readings_text.judged_table(published)
+    )
+    assert (
+        "In 2 of them, which have seeds enough for a verdict, supported and contradicted are: C3 (TLwD) 0 % and 75 %"
+        in (" ".join(readings_text.readings_list(published).split()))
+    )
+
+
+def test_readings_of_a_single_seed_have_no_verdicts(published):
+    for name in ("claims", "verdicts"):
+        file = published / "multiverse" / f"{name}.csv"
+        table = pd.read_csv(file)
+        for column in ("supported", "supported_low", "contradicted", "contradicted_low"):
+            table[column] = math.nan
+        table.assign(judged=0, n_seeds=1).to_csv(file, index=False)
+    assert "verdict" not in readings_text.readings_list(published)
+    assert readings_text.judged_list(published).startswith("- No reading has seeds enough for a verdict")
+    assert readings_text.judged_table(published).count("\n") == 1
 
 
 def test_what_two_questions_decide_together_is_told_apart(published):
@@ -207,7 +245,9 @@ def test_a_world_where_each_statement_holds_somewhere(published):
     path = published / "reconstruction" / "closest.csv"
     pd.read_csv(path).assign(holds=[3, 1, 2, 4, 4, 4, 4]).to_csv(path, index=False)
     first_page = " ".join(reconstruction_text.search_list(published).split())
-    assert first_page.endswith("Each statement's estimate holds in some reading, C4's in 1.")
+    assert first_page.endswith(
+        "Each statement's estimate holds in some reading, C4's in 1. Fresh seeds support 2 of 7 in some."
+    )
     text = " ".join(reconstruction_text.best_list(published).split())
     assert "Each statement's estimate is on its side in some of the 4 readings." in text
     assert "in none of the" not in text
