@@ -122,6 +122,8 @@ def source_in(job: Job, results: xr.Dataset) -> Source:
     """The source that results of a job which hands on its agents hold: leaves with axes of points and of seeds."""
     function = q_function(job.spec, job.groups[0].config)
     like = jax.eval_shape(function.init, jax.random.key(0))
-    weights = [results[_weights_name(path)].values for path, _ in jax.tree_util.tree_leaves_with_path(like)]
-    fields = (results[f"demonstration_{name}"].values for name in NStepTransition._fields)
-    return jax.device_put(Source(jax.tree.unflatten(jax.tree.structure(like), weights), NStepTransition(*fields)))
+    weights = [
+        jax.device_put(results[_weights_name(path)].values) for path, _ in jax.tree_util.tree_leaves_with_path(like)
+    ]
+    fields = (jax.device_put(results[f"demonstration_{name}"].values) for name in NStepTransition._fields)
+    return Source(jax.tree.unflatten(jax.tree.structure(like), weights), NStepTransition(*fields))

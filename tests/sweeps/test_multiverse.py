@@ -33,6 +33,11 @@ from sweeps.studies.registry import SWEEPS
 from sweeps.sweep import Size
 
 
+def frame(sweep):
+    """What is set at a sweep's points, empty where it is as by default."""
+    return pd.DataFrame({column.name: sweep.design.values(column.name) for column in sweep.design.columns})
+
+
 def test_a_reading_is_the_same_whatever_the_number_of_readings():
     many = unit_of(40)
     np.testing.assert_array_equal(unit_of(9), many[:9])
@@ -44,6 +49,15 @@ def test_a_reading_is_the_same_whatever_the_number_of_readings():
         f"multiverse/{a}" for a in ("000000-000063", "000064-000127", "000128-000135")
     ]
     assert sweeps_of(PER_BLOCK, first=PER_BLOCK) == blocks[1:2]
+    few = sweeps_of(2 * PER_BLOCK + 8, per_block=3)
+    assert [sweep.name for sweep in few] == [
+        f"multiverse/{a}" for a in ("000000-000002", "000064-000066", "000128-000130")
+    ]
+    assert sweeps_of(PER_BLOCK + 1, per_block=3)[1] == sweeps_of(1, first=PER_BLOCK)[0]
+    for of_block, whole in zip(few, blocks, strict=True):
+        number = len(of_block.design.values("reading"))
+        assert number == 3 * len(POINTS)
+        pd.testing.assert_frame_equal(frame(of_block), frame(whole).iloc[:number])
 
 
 def test_readings_lie_in_their_ranges_and_each_level_is_tried_equally_often():
@@ -122,15 +136,16 @@ def made_up(monkeypatch, tmp_path):
         ]
         return pd.DataFrame(rows)
 
-    def summarise(folder, number, first=0, seeds=1, keep=False):
-        for sweep in sweeps_of(number, first):
+    def summarise(folder, number, first=0, seeds=1, keep=False, per_block=PER_BLOCK):
+        sweeps = sweeps_of(number, first, per_block)
+        for sweep in sweeps:
             for part in (sweep, sweep.source):
                 path = tmp_path / folder / part.name / store.MANIFEST
                 path.parent.mkdir(parents=True, exist_ok=True)
                 path.write_text(json.dumps(part.name))
         out = tmp_path / folder
         with joblib.parallel_config(backend="sequential"):
-            written = summaries.summarise_multiverse(sweeps_of(number, first), Size(seeds=seeds), out, keep)
+            written = summaries.summarise_multiverse(sweeps, Size(seeds=seeds), out, keep)
         return {path.name: path.read_bytes() for path in written}
 
     monkeypatch.setattr(summaries, "_of_block", of_block)
@@ -156,6 +171,10 @@ def test_only_readings_with_seeds_enough_have_a_part_in_shares_of_verdicts(made_
     assert set(shares.judged) == {PER_BLOCK}
     np.testing.assert_allclose(shares.undecided, 1.0)
     assert (shares.undecided_low > 0.9).all()
+    more = pd.read_csv(io.BytesIO(made_up("out", 2 * PER_BLOCK, seeds=9, keep=True, per_block=3)["verdicts.csv"]))
+    assert more.reading.tolist() == list(range(2 * PER_BLOCK))
+    assert more.reading[more.n_seeds == 9].tolist() == [0, 1, 2, 64, 65, 66]
+    assert set(more.n_seeds[3:64]) == {5}
     alone = pd.read_csv(io.BytesIO(made_up("other", PER_BLOCK)["claims.csv"]))
     assert (alone.judged == 0).all()
     assert alone.supported.isna().all()
@@ -167,6 +186,8 @@ def test_only_readings_with_seeds_enough_have_a_part_in_shares_of_verdicts(made_
         (["multiverse", "--readings", "128", "--first", "63"], "first: 63; allowed: a multiple of 64"),
         (["multiverse", "--readings", "128", "--first", "128"], "first: 128; allowed: a multiple of 64"),
         (["multiverse", "--readings", "128", "--keep"], "keep: True; allowed: where an earlier run left its summary"),
+        (["multiverse", "--per-block", "65"], "per_block: 65; allowed: an int from 1 to 64"),
+        (["fig6", "--per-block", "6"], "name: 'fig6'; allowed: multiverse, for which alone --per-block is"),
         (["fig6", "--first", "64"], "name: 'fig6'; allowed: multiverse, for which alone --first is"),
         (["reconstruction", "--keep"], "name: 'reconstruction'; allowed: multiverse, for which alone --keep is"),
     ],
