@@ -29,6 +29,7 @@ ROBUSTNESS, CALIBRATION = "robustness", "calibration"
 """Folders of published results: of the robustness study, and of `paper_figs.calibration`."""
 _BEGIN = "<!-- made by python -m paper_figs.publish: {name} -->"
 _END = "<!-- end of {name} -->"
+_ROBUSTNESS_COMMAND = ".venv/bin/python -m sweeps run robustness"
 _ANY = re.compile(r"<!-- made by python -m paper_figs\.publish: (\S+) -->\n(.*?)<!-- end of \1 -->", re.DOTALL)
 
 
@@ -200,10 +201,12 @@ def robustness_list(published: Path) -> str:
         for row in [pairs.loc[(a, b)]]
     )
     by_reward = wrong.query("environment == 'target' and score == 'reward'").set_index("study_seeds").misranking
-    misled = ", ".join(f"{n} seeds {percent(by_reward[n])}" for n in by_reward.index)
+    misled = ", ".join(f"{n} {'seeds' if n > 1 else 'seed'} {percent(by_reward[n])}" for n in by_reward.index)
     reached = ", ".join(f"{LABELS[name]} {percent(target.reached[name])}" for name in ("tlwd", "dpr", "ddqn"))
     stays = "median_episodes_low" in target  # tables of older versions count runs that leave again
-    return f"{target.n_seeds.max()} seeds ([tables](published/robustness)) say of the target environment:\n\n" + listed(
+    number = int(target.n_seeds.max())
+    about = f"{number} seeds ([tables](published/robustness)) of the target (`{_ROBUSTNESS_COMMAND} --seeds {number}`) say:\n\n"
+    return about + listed(
         [
             *([f"Runs that get within 5 % of the optimum and stay there: {reached}."] if stays else []),
             f"Exact regret per slot of the last policy: {lost}.",
