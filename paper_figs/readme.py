@@ -205,8 +205,8 @@ def robustness_list(published: Path) -> str:
     reached = ", ".join(f"{LABELS[name]} {percent(target.reached[name])}" for name in ("tlwd", "dpr", "ddqn"))
     stays = "median_episodes_low" in target  # tables of older versions count runs that leave again
     number = int(target.n_seeds.max())
-    about = f"{number} seeds ([tables](published/robustness)) of the target (`{_ROBUSTNESS_COMMAND} --seeds {number}`) say:\n\n"
-    return about + listed(
+    command = f"`{_ROBUSTNESS_COMMAND} --seeds {number}`"
+    return f"{number} seeds ([tables](published/robustness)) of the target ({command}) say:\n\n" + listed(
         [
             *([f"Runs that get within 5 % of the optimum and stay there: {reached}."] if stays else []),
             f"Exact regret per slot of the last policy: {lost}.",

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from jrcjax.readings import DemonstrationRewards
 from paper_figs.analysis.intervals import proportion_effect
 from paper_figs.claims import words
 from paper_figs.claims.learning_table import LABELS
@@ -22,6 +23,7 @@ from sweeps.studies.readings import READINGS, SOURCE
 from sweeps.studies.reconstruction import NAME
 
 _RARE = 0.05
+_MOSTLY = 10.0  # weight of the margin beyond which the other losses hardly count
 _FEW = 8  # answers to a question that are told one by one
 _CONVERGING = ("tlwd", "dpr", "ddqn")
 _PAGE = "docs/explanation/readings.md#the-best-reading"
@@ -158,13 +160,30 @@ def _best_with_trade_off(tried: pd.DataFrame, best: pd.DataFrame) -> str:
     agrees = f"Of all {number} readings with a trade-off, those of the search included, {_named(name)} agrees best with"
     if best.empty:
         return f"{agrees} the text; its fresh seeds are still to come."
-    values, supported = tried.set_index("reading").loc[name].to_dict(), best.claim[best.verdict == "supported"]
+    values, supported = _values(tried, name), best.claim[best.verdict == "supported"]
     return (
         f"{agrees} the text: its single seed promised {int(best.promised.sum())} of {len(best)} statements (agreement "
         f"{percent(values['agreement'])}), and {int(best.n_seeds.max())} fresh seeds gave {int(best.holds.sum())} "
-        f"(agreement {percent(multiverse.agreement(best).mean())}): {_count(best)}. {_pair(values)} Supported: "
-        f"{_names(supported)}."
+        f"(agreement {percent(multiverse.agreement(best).mean())}): {_count(best)}. {_pair(values)} "
+        f"{_imitated(values, _values(tried, DEFAULT))} Supported: {_names(supported)}."
     )
+
+
+def _imitated(values: Mapping[Hashable, Any], default: Mapping[Hashable, Any]) -> str:
+    """How much there is to choose in a reading, and whether TLwD chooses or does what its demonstrations do."""
+    weight, rewards = "hparams.margin_weight", "hparams.demonstration_rewards"
+    imitates = values[weight] > _MOSTLY and values[rewards] == DemonstrationRewards.UNUSED.name.lower()
+    return (
+        f"One action in every state loses {percent(values['lost_by_one_action'])} of its optimum (default: "
+        f"{percent(default['lost_by_one_action'])}). Weight of the margin: {short(values[weight])} (default: "
+        f"{short(default[weight])}); demonstrations' rewards: {short(values[rewards])} (default: "
+        f"{short(default[rewards])})" + (", so TLwD does mostly what its demonstrations do." if imitates else ".")
+    )
+
+
+def _values(tried: pd.DataFrame, name: str) -> dict[Hashable, Any]:
+    """What stands in the row of a reading."""
+    return tried.set_index("reading").loc[name].to_dict()
 
 
 def search_list(published: Path) -> str:
@@ -230,7 +249,7 @@ def best_list(published: Path) -> str:
         f"the text: its single seed promised {int(best.promised.sum())} of {len(best)} statements (agreement "
         f"{percent(agreement[name])}, default {percent(agreement[DEFAULT])}), and {int(best.n_seeds.max())} fresh "
         f"seeds gave {int(best.holds.sum())} (agreement {percent(multiverse.agreement(best).mean())}): {_count(best)}.",
-        _pair(tried.set_index("reading").loc[name].to_dict()),
+        _pair(_values(tried, name)),
         _world(published),
         _converged(best),
         _nowhere(tried, closest) or f"Each statement's estimate is on its side in some of the {len(tried)} readings.",

@@ -225,6 +225,23 @@ def test_where_there_is_a_trade_off_and_what_fits_best_there(published):
     assert text.endswith("Supported: C5 (highest).")
 
 
+def test_an_agent_that_imitates_is_said_to(published):
+    text = " ".join(reconstruction_text.trade_off_list(published).split())
+    weights = "Weight of the margin: 0.5 (default: 0.5); demonstrations' rewards: 0.5 (default: 0.5)."
+    assert f"One action in every state loses 5 % of its optimum (default: 8 %). {weights} Supported: " in text
+    file = published / "reconstruction" / "tried.csv"
+    tried = pd.read_csv(file).astype({"hparams.demonstration_rewards": object})
+    tried.loc[tried.reading == "search 1", ["hparams.margin_weight", "hparams.demonstration_rewards"]] = [
+        95.0,
+        "unused",
+    ]
+    tried.to_csv(file, index=False)
+    text = " ".join(reconstruction_text.trade_off_list(published).split())
+    assert (
+        "Weight of the margin: 95 (default: 0.5); demonstrations' rewards: unused (default: 0.5), so TLwD does" in text
+    )
+
+
 def test_the_first_page_says_how_many_readings_have_a_trade_off(published):
     text = " ".join(reconstruction_text.search_list(published).split())
     assert "loses up to 25 % in it at the points of Figs. 6 to 8 (default: it loses up to 25 %). 50 % of the" in text
