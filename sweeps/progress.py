@@ -13,6 +13,8 @@ from sweeps.engine.estimate import in_words
 
 _INTERVAL = 30.0
 """Seconds between two lines; after an hour of work ten times as many."""
+_TELLING = 0.01
+"""Share of the work before which the time is mostly that of compiling, and says nothing of what is left."""
 _COLUMNS = (
     TextColumn("{task.description}"),
     BarColumn(),
@@ -61,7 +63,7 @@ class Lines:
         self.said = now
         share = min(self.done / self.total, 1.0) if self.total else 1.0
         line = f"{self.name}: {share:.0%} done in {in_words(gone)}"
-        if 0 < share < 1:
+        if _TELLING <= share < 1:
             line += (
                 f", {60 * share / max(gone, 1e-9):.2%} per minute, about {in_words(gone * (1 - share) / share)} left"
             )

@@ -60,6 +60,17 @@ def test_without_a_terminal_progress_is_a_line_at_intervals():
     ]
 
 
+def test_what_is_left_is_told_when_more_than_compiling_is_done():
+    said, clock = io.StringIO(), iter([0.0, 40.0, 80.0])
+    lines = progress.Lines(Console(file=said), "fig6", 1000.0, clock=lambda: next(clock))
+    for done in (1, 19):
+        lines.advance(done)
+    assert said.getvalue().splitlines() == [
+        "fig6: 0% done in 40 s",
+        "fig6: 2% done in 80 s, 1.50% per minute, about 65 min left",
+    ]
+
+
 def test_on_a_terminal_progress_is_a_bar():
     said = io.StringIO()
     with progress.shown(Console(file=said, force_terminal=True), "fig6", 2.0) as advance:
