@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from sweeps.studies.fig5a import FIG5A
 from sweeps.sweep import Sweep
 
-SOURCE = Sweep(
-    name="source",
-    description="source agents and their demonstrations",
-    learners=("ddqn",),
-    environment="source",
-    hands_on=True,
-)
+SOURCE = replace(FIG5A, name="source", description="source agents and their demonstrations", hands_on=True)
+"""With the learners of Fig. 5(a), whose program serves both: the others are cheap, and compiling is not."""
 
 _NOT_THE_SOURCES = frozenset(
     {
@@ -55,8 +51,8 @@ def source_for(sweep: Sweep, of_table1: bool = False) -> tuple[Sweep, tuple[int,
     fixed = tuple((path, value) for path, value in sweep.fixed if _is_the_sources(path, of_table1))
     if not design.columns and not fixed:
         return SOURCE, ()
-    name = f"{sweep.name}-source"
-    return replace(SOURCE, name=name, design=design, fixed=fixed, own=True, seeds_per_part=sweep.seeds_per_part), points
+    of_points = {"design": design, "fixed": fixed, "seeds_per_part": sweep.seeds_per_part, "own": True}
+    return replace(SOURCE, name=f"{sweep.name}-source", learners=("ddqn",), **of_points), points
 
 
 def _is_the_sources(path: str, of_table1: bool) -> bool:

@@ -327,12 +327,12 @@ def test_a_transfer_sweep_compiles_once_for_all_blocks_and_that_ahead_of_them(tm
     size = replace(TINY, seeds=2 * FIG5A.seeds_per_part, episodes=1, pretraining=3)
     sweep = replace(PAIR, learners=("tlwd", "dpr"))
     again = replace(sweep, name="again", design=along(_P, _P, (0.2, 0.4, 0.6)))  # a program serves any few points
-    with compilations() as compiled, contextlib.closing(compile_ahead([sweep, again], size, tmp_path)) as ahead:
-        for each in (SOURCE, sweep, again):
+    with compilations() as compiled, contextlib.closing(compile_ahead([FIG5A, sweep, again], size, tmp_path)) as ahead:
+        for each in (FIG5A, SOURCE, sweep, again):
             ahead.wait(each)
-        # Source agents start, advance and demonstrate; the sweep's agents start and advance.
+        # Source agents start and advance like those of Fig. 5(a), and demonstrate; the sweep's agents start and advance.
         assert compiled.count("jit(checked)") == 5
-        for each in (sweep, again):
+        for each in (FIG5A, sweep, again):
             run_sweep(each, size, tmp_path, QUIET, resume=False, ahead=ahead)
     assert compiled.count("jit(checked)") == 5
 
