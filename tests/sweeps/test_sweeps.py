@@ -330,7 +330,7 @@ def test_a_transfer_sweep_compiles_once_for_all_blocks_and_that_ahead_of_them(tm
     with compilations() as compiled, contextlib.closing(compile_ahead([FIG5A, sweep, again], size, tmp_path)) as ahead:
         for each in (FIG5A, SOURCE, sweep, again):
             ahead.wait(each)
-        # Source agents start and advance like those of Fig. 5(a), and demonstrate; the sweep's agents start and advance.
+        # Source agents start and advance like those of Fig. 5(a), and demonstrate; the sweep's start and advance.
         assert compiled.count("jit(checked)") == 5
         for each in (FIG5A, sweep, again):
             run_sweep(each, size, tmp_path, QUIET, resume=False, ahead=ahead)
