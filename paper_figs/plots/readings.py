@@ -25,9 +25,9 @@ def draw_shares(claims: pd.DataFrame) -> Figure:
     axes, rows = figure.subplots(), np.arange(len(claims))[::-1]
     for name, colour, marker, shift in (
         ("holds", "black", "o", 0.0),
-        ("supported", _GREEN, "^", 0.22),
-        ("contradicted", _ORANGE, "v", -0.22),
-        ("negligible", _BLUE, "s", -0.22),
+        ("supported", _GREEN, "^", 0.25),
+        ("contradicted", _ORANGE, "v", -0.2),
+        ("negligible", _BLUE, "s", -0.4),
     ):
         value = claims[name].to_numpy()
         if name != "holds" and not (value > 0).any():
