@@ -29,7 +29,7 @@ class Ahead:
         # Tracing holds the interpreter's lock, so a single thread does all of it.
         self._tracing = ThreadPoolExecutor(1, "tracing")
         self._compiling = ThreadPoolExecutor(usable_cores(), "compiling")
-        self._known: set[Any] = set()
+        self._agents: dict[Any, Any] = {}  # shapes of what known programs start, by program and shapes
         self._jobs = {job.sweep: self._tracing.submit(self._of_job, job, seeds) for job, seeds in jobs}
 
     def wait(self, sweep: Sweep) -> None:
@@ -49,14 +49,13 @@ class Ahead:
     def _of_group(self, job: Job, group: Group, seeds: range) -> list[Future]:
         program = program_of(job.sweep.learners, job.spec, group.config, chunk_of(group.config.episodes))
         table, lanes = job.shapes, _lanes(job, group, seeds)
-        if (key := (program, str(jax.tree.map(jnp.shape, (table, lanes))))) in self._known:
-            return []
-        self._known.add(key)
-        start = program.start.lower(table, lanes)
-        first = (table, jnp.int32(0)), (_on_devices(start.out_info), lanes[2])
-        lowered = [start, program.advance.lower(*first)]
+        key, lowered = (program, str(jax.tree.map(jnp.shape, (table, lanes)))), []
+        if key not in self._agents:
+            start = program.start.lower(table, lanes)
+            self._agents[key] = agents = _on_devices(start.out_info)
+            lowered = [start, program.advance.lower((table, jnp.int32(0)), (agents, lanes[2]))]
         if job.sweep.hands_on:
-            states = _on_devices(start.out_info)["ddqn"].learner
+            states = self._agents[key]["ddqn"].learner
             lowered.append(hand_on(job.spec, group.config).lower(table, (lanes[0], lanes[2], states)))
         return [self._compiling.submit(each.compile) for each in lowered]
 
