@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from jrcjax.config.paths import DISTRIBUTIONS, Entry, Parameter, Points, leaf_of
@@ -35,7 +34,7 @@ def stacked(base: Points, columns: Sequence[Values], number: int) -> Points:
     """
     of_radar = [c for c in columns if _is_of_radar(c)]
     others = [c for c in columns if c not in of_radar and c.parameter.container != "config"]
-    bare = base._replace(params=_with(base.params, radar=jnp.zeros(())))
+    bare = base._replace(params=_with(base.params, radar=np.zeros(())))
     points = jax.tree.map(lambda leaf: np.broadcast_to(leaf, (number, *np.shape(leaf))), bare)
     for column in others:
         changed = getattr(points, column.parameter.container)

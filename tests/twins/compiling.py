@@ -19,4 +19,4 @@ def nothing_compiles():
         yield
     finally:
         jax.monitoring.unregister_event_duration_listener(listen)
-    assert not compiled
+    assert not compiled, compiled
