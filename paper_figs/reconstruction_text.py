@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from jrcjax.readings import DemonstrationRewards
 from paper_figs.analysis.intervals import proportion_effect
 from paper_figs.claims import words
 from paper_figs.claims.learning_table import LABELS
@@ -172,7 +171,7 @@ def _best_with_trade_off(tried: pd.DataFrame, best: pd.DataFrame) -> str:
 def _imitated(values: Mapping[Hashable, Any], default: Mapping[Hashable, Any]) -> str:
     """How much there is to choose in a reading, and whether TLwD chooses or does what its demonstrations do."""
     weight, rewards = "hparams.margin_weight", "hparams.demonstration_rewards"
-    imitates = values[weight] > _MOSTLY and values[rewards] == DemonstrationRewards.UNUSED.name.lower()
+    imitates = values[weight] > _MOSTLY and values[rewards] == "unused"
     return (
         f"One action in every state loses {percent(values['lost_by_one_action'])} of its optimum (default: "
         f"{percent(default['lost_by_one_action'])}). Weight of the margin: {short(values[weight])} (default: "

@@ -25,7 +25,7 @@ from jrcjax.radar.placement import Footprints
 from jrcjax.types import Key, Words
 
 PLACEMENTS = ("bank", "fresh")
-_CHUNK = {"cpu": 16}  # placements handled at once while a bank is built: their boxes stay in a core's cache
+_CHUNK = 16  # placements handled at once while a bank is built: their boxes stay in a core's cache
 _ACCELERATOR_CHUNK = 256
 _MOST_PLACED = 2**28  # objects in all placements of a bank: about a minute of work
 _KNOWN_BANKS = 256  # a bank of two modes takes 32 kB
@@ -117,7 +117,7 @@ def _compiled(structure: Any, shapes: tuple[jax.ShapeDtypeStruct, ...], size: in
 
 @jax.jit(static_argnums=2)
 def _build(modes: Modes, seed: Array, size: int) -> Array:
-    chunk = min(size, _CHUNK.get(jax.default_backend(), _ACCELERATOR_CHUNK))
+    chunk = min(size, _CHUNK if jax.default_backend() == "cpu" else _ACCELERATOR_CHUNK)
 
     def of_mode(mode: int) -> Array:
         keys = jax.vmap(lambda i: bank_key(seed, mode, i))(jnp.arange(size))

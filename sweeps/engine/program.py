@@ -99,19 +99,13 @@ def program_of(learners: tuple[str, ...], spec: Spec, config: Config, chunk: int
     return Program(parallel.over_agents(start), parallel.over_agents(advance, in_place=True))
 
 
-def keys_of(seeds: np.ndarray) -> Key:
-    """Keys of seeds [N]: seed i has `fold_in(key(0), i)`, whatever other seeds there are."""
-    return _keys(seeds)
-
-
 @jax.jit
-def _keys(seeds: Array) -> Key:
+def keys_of(seeds: Array | np.ndarray) -> Key:
+    """Keys of seeds [N]: seed i has `fold_in(key(0), i)`, whatever other seeds there are."""
     return jax.vmap(lambda i: jax.random.fold_in(jax.random.key(0), i))(seeds)
 
 
-@jax.jit
-def _target_keys(keys: Key) -> Key:
-    return jax.vmap(target_key)(keys)
+_target_keys = jax.jit(jax.vmap(target_key))
 
 
 def lanes_of(job: Job, group: Group, seeds: range) -> Lanes:
