@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 
 from benchmarks import ours
-from benchmarks.measure import Case, Result, header, in_turns, row
+from benchmarks.measure import Case, Result, in_turns, print_table
 
 
 def run(quick: bool) -> list[Result]:
@@ -20,10 +20,10 @@ def run(quick: bool) -> list[Result]:
         for name, steps in (("ddqn", 3000), ("tlwd", 1500))
         for capacity in capacities
     ]
-    results, _ = in_turns(cases, 3 if quick else 7)
-    header()
-    for result in results:
-        row(result)
+    results, failed = in_turns(cases, 3 if quick else 7)
+    print_table(results, failed)
+    if failed:
+        return results
     for first in (0, len(capacities)):
         ratio = results[first + 2].us_per_agent_step / results[first].us_per_agent_step
         print(f"{cases[first].name.split()[0]}: ten times the capacity costs {ratio:.2f} times as much")

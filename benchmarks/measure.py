@@ -10,7 +10,7 @@ import resource
 import statistics
 import sys
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -76,8 +76,17 @@ def row(r: Result) -> None:
     print(f"{r.case:20s}{r.agents:7d}{'':6s}{spread(r.us_each)}{r.compile_s:9.1f}{r.peak_rss_mb:9.0f}", flush=True)
 
 
-class NotInstalled(Exception):
-    """A case needs a package that is not there."""
+def print_table(results: Iterable[Result], failed: Mapping[str, str]) -> None:
+    """Prints results, and why other cases have none."""
+    header()
+    for result in results:
+        row(result)
+    for case, reason in failed.items():
+        print(f"{case:20s} not measured: {reason}", flush=True)
+
+
+class NotMeasured(Exception):
+    """A case cannot run here; says why."""
 
 
 def _digits(value: float) -> str:
@@ -113,7 +122,7 @@ class Running:
     """A case in its processes."""
 
     def __init__(self, case: Case):
-        """Waits until the case is compiled and warmed up; raises NotInstalled."""
+        """Waits until the case is compiled and warmed up; raises NotMeasured."""
         self.case = case
         self._repetitions: list[float] = []
         self._peaks: list[float] = []
@@ -125,19 +134,32 @@ class Running:
             self._processes[-1].start()
             theirs.close()
             self._pipes.append(ours)
-        answers = [pipe.recv() for pipe in self._pipes]
+        answers = self._answers()
         if isinstance(answers[0], str):
-            raise NotInstalled(answers[0])
+            self.stop()
+            raise NotMeasured(f"the package {answers[0]} is missing; `make bench` installs it")
         self._compile_s = max(answers)
 
     def repeat(self) -> None:
         """Times one repetition."""
         for pipe in self._pipes:
             pipe.send(True)
-        answers = [pipe.recv() for pipe in self._pipes]
+        answers = self._answers()
         steps = self.case.agents * self.case.processes * self.case.steps
         self._repetitions.append(max(seconds for seconds, _ in answers) / steps * 1e6)
         self._peaks = [peak for _, peak in answers]
+
+    def _answers(self) -> list[Any]:
+        """One of each process; raises NotMeasured when XLA's own checks or the lack of memory have ended one."""
+        answers = []
+        for pipe, process in zip(self._pipes, self._processes, strict=True):
+            try:
+                answers.append(pipe.recv())
+            except EOFError:
+                process.join()
+                self.stop()
+                raise NotMeasured(f"its process ended with status {process.exitcode}") from None
+        return answers
 
     def result(self) -> Result:
         """What was measured so far."""
@@ -163,25 +185,30 @@ class Running:
 
 
 def in_turns(cases: Iterable[Case], repetitions: int) -> tuple[list[Result], dict[str, str]]:
-    """Results of the cases, and those that could not run with the package that they lack."""
+    """Results of the cases, and why the others could not run."""
     with ExitStack() as stack:
-        running, lacking = [], {}
+        running: list[Running] = []
+        failed: dict[str, str] = {}
         for case in cases:
             try:
                 running.append(Running(case))
-            except NotInstalled as error:
-                lacking[case.name] = str(error)
+            except NotMeasured as error:
+                failed[case.name] = str(error)
                 continue
             stack.callback(running[-1].stop)
         for _ in range(repetitions):
-            for one in running:
-                one.repeat()
-        return [one.result() for one in running], lacking
+            for one in list(running):
+                try:
+                    one.repeat()
+                except NotMeasured as error:
+                    failed[one.case.name] = str(error)
+                    running.remove(one)
+        return [one.result() for one in running], failed
 
 
 def alone(case: Case, repetitions: int) -> Result:
-    """The result of one case; raises NotInstalled."""
-    results, lacking = in_turns([case], repetitions)
-    if lacking:
-        raise NotInstalled(*lacking.values())
+    """The result of one case; raises NotMeasured."""
+    results, failed = in_turns([case], repetitions)
+    if failed:
+        raise NotMeasured(*failed.values())
     return results[0]

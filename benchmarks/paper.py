@@ -13,7 +13,7 @@ import sys
 import tempfile
 import time
 
-from benchmarks.measure import Case, NotInstalled, Result, alone
+from benchmarks.measure import Case, NotMeasured, Result, alone
 from benchmarks.peers import sb3_dqn
 
 LIMIT = 2.0
@@ -29,8 +29,8 @@ def run(quick: bool) -> list[Result]:
     print(f"all figures{' (tiny version)' if quick else ''}: {seconds / 60:.1f} min")
     try:
         step = alone(Case("sb3_dqn", sb3_dqn.setup, 1, 1000 if quick else 5000), 3)
-    except NotInstalled as error:
-        print(f"Stable-Baselines3 not measured: the package {error} is missing; `make bench` installs it")
+    except NotMeasured as error:
+        print(f"Stable-Baselines3 not measured: {error}")
         return []
     one_run = 300_000 * step.us_per_agent_step * 1e-6
     print(f"one Stable-Baselines3 run of 300,000 steps: {one_run / 60:.1f} min")

@@ -12,11 +12,11 @@ from __future__ import annotations
 
 import functools
 import statistics
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from benchmarks import ours
-from benchmarks.measure import Case, NotInstalled, Ready, Result, alone, header, in_turns, row, spread
+from benchmarks.measure import Case, NotMeasured, Ready, Result, alone, in_turns, print_table, spread
 from benchmarks.peers import flashbax_dqn, purejaxrl_dqn, rejax_dqn, sb3_dqn
 
 RATIOS = (
@@ -66,37 +66,41 @@ def cases(quick: bool) -> list[Case | Peer]:
     ]
 
 
-def fastest(peer: Peer, quick: bool) -> Case:
-    """The peer's best case."""
-    if quick or len(peer.candidates) == 1:
-        return peer.candidates[0]
-    try:
-        results = [alone(case, 2) for case in peer.candidates]
-    except NotInstalled:
-        return peer.candidates[0]  # said when it is run
-    tried = ", ".join(f"{r.agents}: {r.us_per_agent_step:.0f}" for r in results)
-    print(f"{results[0].case}: us per agent-step with so many agents: {tried}", flush=True)
-    return min(zip(results, peer.candidates, strict=True), key=lambda pair: pair[0].us_per_agent_step)[1]
+def fastest(candidates: Sequence[Case], quick: bool) -> Case:
+    """The best case of a peer; the first if `quick`, or if none can be measured."""
+    if quick or len(candidates) == 1:
+        return candidates[0]
+    results = {}
+    for case in candidates:
+        try:
+            results[case] = alone(case, 2).us_per_agent_step
+        except NotMeasured as error:
+            print(f"{case.name}, {case.agents} agents: {error}", flush=True)
+    tried = ", ".join(f"{case.agents}: {us:.0f}" for case, us in results.items())
+    print(f"{candidates[0].name}: us per agent-step with so many agents: {tried}", flush=True)
+    return min(results, key=results.__getitem__, default=candidates[0])
 
 
 def _as_run(case: Case | Peer, quick: bool) -> list[Case]:
-    """The case itself, or a peer's best one, without and with our flags."""
+    """The case itself, or a peer's best one without our flags and its best one with them."""
     if isinstance(case, Case):
         return [case]
-    best = fastest(case, quick)
-    flagged = best._replace(name=best.name + "_flags", setup=functools.partial(with_flags, best.setup))
-    return [best, flagged] if case.in_jax and not quick else [best]
+    ways = [case.candidates]
+    if case.in_jax and not quick:
+        ways.append(
+            tuple(
+                one._replace(name=f"{one.name}_flags", setup=functools.partial(with_flags, one.setup))
+                for one in ways[0]
+            )
+        )
+    return [fastest(candidates, quick) for candidates in ways]
 
 
 def run(quick: bool) -> list[Result]:
     """Measures all cases and prints a table and ratios."""
     chosen = [one for case in cases(quick) for one in _as_run(case, quick)]
-    results, lacking = in_turns(chosen, 3 if quick else 9)
-    header()
-    for result in results:
-        row(result)
-    for name, package in lacking.items():
-        print(f"{name:20s}not measured: the package {package} is missing; `make bench` installs it")
+    results, failed = in_turns(chosen, 3 if quick else 9)
+    print_table(results, failed)
     by_name = {result.case: result for result in results}
     print("\nus per agent-step of the second, divided by the first's")
     for first, second in [(a, name) for a, b in RATIOS for name in (b, b + "_flags")]:

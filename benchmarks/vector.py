@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.measure import Case, Ready, Result, header, in_turns, row
+from benchmarks.measure import Case, Ready, Result, in_turns, print_table
 from jrcjax.model.params import EnvParams
 from jrcjax.training import parallel
 
@@ -109,12 +109,8 @@ def cases(quick: bool) -> list[Case]:
 
 def run(quick: bool) -> list[Result]:
     """Measures all cases side by side, prints a table and compares with the claim."""
-    results, lacking = in_turns(cases(quick), 3 if quick else 7)
-    header()
-    for result in results:
-        row(result)
-    for name, package in lacking.items():
-        print(f"{name:16s}left out: no {package}")
+    results, failed = in_turns(cases(quick), 3 if quick else 7)
+    print_table(results, failed)
     for result in results:
         if result.case in LIMITS:
             held = "holds" if result.us_per_agent_step <= LIMITS[result.case] else "DOES NOT HOLD"

@@ -1,0 +1,41 @@
+"""Benchmarks: a case that ends with its process, or lacks a package, leaves the other cases measured."""
+
+import os
+
+from benchmarks.measure import Case, Ready, in_turns, print_table
+
+
+def sound(agents, steps):
+    return Ready(lambda: None, 0.5)
+
+
+def ends_while_compiling(agents, steps):
+    os._exit(3)
+
+
+def ends_in_second_repetition(agents, steps):
+    calls = iter((None, None))  # the first is the warm-up
+    return Ready(lambda: next(calls, 0) is None or os._exit(4), 0.5)
+
+
+def without_package(agents, steps):
+    raise ModuleNotFoundError("no", name="rejax")
+
+
+def test_the_other_cases_are_measured(capsys):
+    cases = [
+        Case("compiling", ends_while_compiling, 2, 10, processes=2),
+        Case("sound", sound, 2, 10),
+        Case("repeating", ends_in_second_repetition, 2, 10),
+        Case("lacking", without_package, 2, 10),
+    ]
+    results, failed = in_turns(cases, 3)
+    assert [(r.case, len(r.us_each), r.compile_s) for r in results] == [("sound", 3, 0.5)]
+    assert list(failed) == ["compiling", "lacking", "repeating"]
+    assert "status 3" in failed["compiling"]
+    assert "status 4" in failed["repeating"]
+    assert "rejax" in failed["lacking"]
+    print_table(results, failed)
+    printed = capsys.readouterr().out
+    assert all(case.name in printed for case in cases)
+    assert printed.count("not measured") == 3
