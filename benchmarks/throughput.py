@@ -11,6 +11,7 @@ flags that this package sets (not in a quick run). The README has the numbers of
 from __future__ import annotations
 
 import functools
+import os
 import statistics
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -38,10 +39,14 @@ class Peer(NamedTuple):
 
 
 def with_flags(setup: Callable[[int, int], Ready], agents: int, steps: int) -> Ready:
-    """A peer with the XLA flags that this package sets, on one device as without them."""
+    """A peer with the XLA flags that this package sets, on one device as without them.
+
+    All but one: fusion with several results, with which XLA ends the process while it compiles any of the peers.
+    """
     from jrcjax.training import parallel
 
     parallel.set_flags()
+    os.environ["XLA_FLAGS"] = os.environ["XLA_FLAGS"].replace(",xla_cpu_use_multi_output_fusion=true", "")
     return setup(agents, steps)
 
 
