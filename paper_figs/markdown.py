@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterable
 
 _WIDTH = 120
@@ -20,6 +21,11 @@ def percent(share: float) -> str:
 def listed(items: Iterable[str]) -> str:
     """Sentences as a list, wrapped."""
     return "\n".join(wrapped(item) for item in items)
+
+
+def paragraph(text: str) -> str:
+    """Sentences in lines of the usual width."""
+    return textwrap.fill(text, _WIDTH, break_long_words=False, break_on_hyphens=False)
 
 
 def wrapped(item: str) -> str:

@@ -2,8 +2,8 @@
 
     python -m paper_figs.publish --figures out --robustness OUT/robustness/summary
 
-and the same for --multiverse and --reconstruction, for the folder of one sweep, --huber, and for what `make figures`
-wrote with --preset best, --best.
+and the same for --multiverse and --reconstruction, for folders of custom sweeps that texts quote, --custom, and for
+what `make figures` wrote with --preset best, --best.
 
 Without options the texts alone are renewed.
 """
@@ -16,6 +16,7 @@ import shutil
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import tyro
 
@@ -24,7 +25,6 @@ from paper_figs.analysis import front
 from paper_figs.figures import FIGURES
 from paper_figs.numbers import numbers_of
 from paper_figs.pipeline import results_folder
-from paper_figs.readings_text import HUBER
 from paper_figs.readme import renewed
 from paper_figs.studies.reconstruction import BEST, PRESET_FILE
 from sweeps.options import FLAGS, Folder
@@ -54,8 +54,8 @@ class Options:
     """Folder with the summary of a reconstruction, whose best reading becomes the preset `best`."""
     best: Folder = None
     """Folder that `make figures` wrote with that preset."""
-    huber: Folder = None
-    """Folder of the custom sweep of the Huber loss, see docs/explanation/readings.md."""
+    custom: Annotated[tuple[Path, ...], tyro.conf.UseAppendAction] = ()
+    """Folder of a custom sweep, whose name it keeps; for those that texts quote see docs/explanation/readings.md."""
     root: Folder = ROOT
     """Folder of the project."""
 
@@ -111,10 +111,10 @@ def publish_preset(file: Path, target: Path) -> Path:
 
 
 def publish_sweep(folder: Path, target: Path) -> list[Path]:
-    """Copies table, figure and manifest of a custom sweep; returns the files in `target`."""
+    """Copies tables, figures and manifest of a custom sweep; returns the files in `target`."""
     target.mkdir(parents=True, exist_ok=True)
-    names = (*(f"{folder.name}{suffix}" for suffix in (".csv", ".pdf", ".png")), store.MANIFEST)
-    return [Path(shutil.copyfile(folder / name, target / name)) for name in names]
+    summary = [path for path in sorted(folder.glob(f"{folder.name}*")) if path.suffix in (".csv", ".pdf", ".png")]
+    return [Path(shutil.copyfile(path, target / path.name)) for path in (*summary, folder / store.MANIFEST)]
 
 
 def renew_texts(root: Path) -> list[Path]:
@@ -145,8 +145,8 @@ def main(args: list[str] | None = None) -> int:
         if options.best:
             preset = preset_of(str(root / "sweeps" / "presets" / PRESET_FILE))
             written += publish_figures(options.best, root / "published" / BEST, preset)
-        if options.huber:
-            written += publish_sweep(options.huber, root / "published" / HUBER)
+        for folder in options.custom:
+            written += publish_sweep(folder, root / "published" / folder.name)
         written += renew_texts(root)
     except (ValueError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)

@@ -11,53 +11,31 @@ import numpy as np
 import pandas as pd
 
 from jrcjax.readings import Loss
-from paper_figs.analysis.intervals import proportion_effect
 from paper_figs.claims.results import Rules
-from paper_figs.markdown import listed, percent, table
-from paper_figs.plots import style
+from paper_figs.markdown import listed, paragraph, percent, table
+from paper_figs.published import NAMED, csv_of, held, of_multiverse, share, share_of, tried_in
 from paper_figs.studies import multiverse
 from sweeps.design import in_range
 from sweeps.preset import SOURCES
 from sweeps.studies.multiverse import MULTIVERSE
 from sweeps.studies.readings import READINGS, SOURCE, Reading, as_text, choices, default_unit, range_of, values_at
 
-NAMED = ("C3 (TLwD)", "C5 (highest)", "C8 (miss detection, DDQN)", "C13 (highest)")
-"""Statements that the first page names."""
-FIGURES = "figures"
-"""The published figures under the default readings."""
-HUBER = "huber"
-"""The published sweep of the Huber loss."""
 TOGETHER = ("C5 (highest)", "C13 (highest)")
 """Statements that loss and source decide together."""
 _NEARLY_ALL = 0.9
+_BLIND = 1.0  # cross-validated error from which a surrogate is no better than the mean
 _DECIDING = 0.05  # least total-order index, from its lower limit, of a question that is said to decide
-
-
-def csv_of(published: Path, study: str, name: str) -> pd.DataFrame:
-    """A published table."""
-    return pd.read_csv(published / study / f"{name}.csv", keep_default_na=True)
-
-
-def _share(row: Mapping[Hashable, Any], name: str) -> str:
-    return f"{percent(row[name])} ({100 * row[f'{name}_low']:.3g} to {100 * row[f'{name}_high']:.3g})"
 
 
 def _holds(row: Mapping[Hashable, Any]) -> str:
     """Where a statement holds, and where that is unknown."""
-    return _share(row, "holds") + (f", unknown in {percent(row['unknown'])}" if row["unknown"] else "")
-
-
-def share_of(holds: pd.Series) -> str:
-    """The share of readings in which a statement holds."""
-    if holds.empty:
-        return "not among these readings"
-    of = proportion_effect(int(holds.sum()), len(holds))
-    return _share({"holds": float(of.value), "holds_low": float(of.low), "holds_high": float(of.high)}, "holds")
+    return share(row, "holds") + (f", unknown in {percent(row['unknown'])}" if row["unknown"] else "")
 
 
 def _strongest(sensitivity: pd.DataFrame, claim: str, most: int) -> pd.DataFrame:
-    """The questions that decide a statement, the strongest first."""
-    return sensitivity.query("claim == @claim and total_low > @_DECIDING").nlargest(most, "total")
+    """The questions that decide a statement, the strongest first; none where the surrogate predicts nothing."""
+    of_claim = sensitivity.query("claim == @claim and total_low > @_DECIDING and surrogate_error < @_BLIND")
+    return of_claim.nlargest(most, "total")
 
 
 def _deciding(sensitivity: pd.DataFrame, claim: str, most: int = 3) -> str:
@@ -67,28 +45,61 @@ def _deciding(sensitivity: pd.DataFrame, claim: str, most: int = 3) -> str:
 
 
 def readings_list(published: Path) -> str:
-    """In which share of the readings the statements hold, and what decides."""
-    claims, sensitivity = (csv_of(published, MULTIVERSE.name, name) for name in ("claims", "sensitivity"))
-    number, by_name = int(claims.readings.max()), {row["claim"]: row for row in claims.to_dict("records")}
-    sentences = [
-        f"{name} holds in {_holds(by_name[name])}; decided most by {_deciding(sensitivity, name, 2)}." for name in NAMED
-    ]
-    sentences.append(_together(csv_of(published, MULTIVERSE.name, "verdicts")))
-    if judged := int(claims.judged.max()):
-        sentences.append(_verdicts_in_short(judged, by_name))
-    about = (
-        f"Shares of {number} readings ([tables](published/{MULTIVERSE.name})) in which the estimate is on the "
-        "statement's side, with 95 %\nintervals, and total-order indices of what decides it; unknown is where no run "
-        "converges:\n\n"
+    """In which share of the readings the statements hold, and what decides, for the first page."""
+    claims, sensitivity, verdicts = (
+        csv_of(published, MULTIVERSE.name, name) for name in ("claims", "sensitivity", "verdicts")
     )
-    return about + listed(sentences)
+    worthwhile, idle = of_multiverse(tried_in(published))
+    judged, by_name = int(claims.judged.max()), {row["claim"]: row for row in claims.to_dict("records")}
+    rows = [
+        (
+            name,
+            _holds(by_name[name]),
+            held(published, worthwhile, name),
+            *([f"{percent(by_name[name][v])}" for v in ("supported", "contradicted")] if judged else []),
+            _deciding_where(verdicts, sensitivity, name),
+        )
+        for name in NAMED
+    ]
+    of_verdicts = ("supported", "contradicted") if judged else ()
+    head = ("statement", "on its side", "with a trade-off", *of_verdicts, "decided most by (most often with)")
+    of_judged = f"; of verdicts in {judged} with seeds enough ([all](docs/explanation/readings.md#verdicts))"
+    about = paragraph(
+        f"Shares of {int(claims.readings.max())} readings ([tables](published/{MULTIVERSE.name})) in which the "
+        "estimate is on the statement's side, with 95 % intervals (unknown: no run converges); of the "
+        f"{len(worthwhile)} of {len(worthwhile) + len(idle)} in which no single action is optimal"
+        + (of_judged if judged else "")
+        + "; and total-order indices of what decides it:"
+    )
+    return f"{about}\n\n{table(head, rows)}\n\n{listed([_together(published, verdicts)])}"
 
 
-def _verdicts_in_short(judged: int, by_name: Mapping[Hashable, Mapping[Hashable, Any]]) -> str:
-    shares = (f"{n} {percent(by_name[n]['supported'])} and {percent(by_name[n]['contradicted'])}" for n in NAMED)
+def _deciding_where(verdicts: pd.DataFrame, sensitivity: pd.DataFrame, claim: str) -> str:
+    """The two questions that decide a statement most, each with the answer with which it holds most often."""
+    found = []
+    for row in _strongest(sensitivity, claim, 2).to_dict("records"):
+        names, which, holds = _by_answer(verdicts, claim, str(row["input"]))
+        most = max(range(len(names)), key=lambda i: holds[which == i].mean())
+        found.append(f"{row['input']} {row['total']:.2f} ({names[most]})")
+    return ", ".join(found) or "no single question"
+
+
+def _by_answer(verdicts: pd.DataFrame, claim: str, label: str) -> tuple[list[str], np.ndarray, pd.Series]:
+    """Names of a question's answers; which of them each reading has; and whether a statement holds in it."""
+    sampled = verdicts.query("claim == @claim and reading > 0").set_index("reading")
+    places = multiverse.places(int(verdicts.reading.max()) + 1)[label]
+    (reading,) = (reading for reading in READINGS if reading.label == label)
+    return *_answers(reading, places.loc[sampled.index].to_numpy()), sampled.holds.astype(bool)
+
+
+def never_judged_so(published: Path, claims: list[str]) -> str:
+    """Which of some statements no reading with seeds enough for a verdict supports, and what bound that gives."""
+    shares = csv_of(published, MULTIVERSE.name, "claims").query("claim in @claims and judged > 0 and supported == 0")
+    if shares.empty:
+        return "Each of these is supported in some of the multiverse's readings with verdicts."
     return (
-        f"In {judged} of them, which have seeds enough for a verdict, supported and contradicted are: "
-        f"{'; '.join(shares)} ([all](docs/explanation/readings.md#verdicts))."
+        f"Of these, supported in none of the {int(shares.judged.max())} readings of the multiverse with verdicts "
+        f"either, so in at most {percent(shares.supported_high.max())} of the space: {'; '.join(shares.claim)}."
     )
 
 
@@ -97,7 +108,7 @@ def judged_table(published: Path) -> str:
     claims = csv_of(published, MULTIVERSE.name, "claims")
     names = (*multiverse.VERDICTS, "negligible")
     rows = [
-        (row["claim"], *(_share(row, name) for name in names)) for row in claims.query("judged > 0").to_dict("records")
+        (row["claim"], *(share(row, name) for name in names)) for row in claims.query("judged > 0").to_dict("records")
     ]
     return table(("statement", *names), rows)
 
@@ -139,17 +150,22 @@ def extremes_list(published: Path) -> str:
     )
 
 
-def _together(verdicts: pd.DataFrame) -> str:
-    """What the loss and the source decide together."""
+def _together(published: Path, verdicts: pd.DataFrame) -> str:
+    """What the loss and the source decide together, everywhere and where there is a trade-off."""
     places = multiverse.places(int(verdicts.reading.max()) + 1)
     chosen = {"hparams.loss": Loss.HUBER.value, SOURCE: SOURCES.index("table1")}
     labels = {reading.path: reading.label for reading in READINGS}
     both = np.all([places[labels[path]] == answer for path, answer in chosen.items()], axis=0)
+    worthwhile, _ = of_multiverse(tried_in(published))
     parts = []
     for claim in TOGETHER:
         holds = verdicts.query("claim == @claim and reading > 0").set_index("reading").holds.astype(bool)
-        here = both[holds.index.to_numpy(int)]
-        parts.append(f"{claim} holds in {share_of(holds[here])}, in all others in {share_of(holds[~here])}")
+        here = pd.Series(both[holds.index.to_numpy(int)], holds.index)
+        everywhere, with_one = (
+            f"{share_of(holds[of & here])}, in all others in {share_of(holds[of & ~here])}"
+            for of in (here | True, holds.index.isin(worthwhile.index))
+        )
+        parts.append(f"{claim} holds in {everywhere} (with a trade-off: {with_one})")
     return (
         "With the Huber loss in the target and Table I's source together, "
         + "; ".join(parts)
@@ -176,12 +192,10 @@ def decided_table(published: Path) -> str:
 def answers_table(published: Path) -> str:
     """Where the statements of the first page hold, by the answers to the two questions that decide each most."""
     verdicts, sensitivity = (csv_of(published, MULTIVERSE.name, name) for name in ("verdicts", "sensitivity"))
-    places, by_label = multiverse.places(int(verdicts.reading.max()) + 1), {r.label: r for r in READINGS}
     rows = []
     for claim in NAMED:
-        holds = verdicts.query("claim == @claim and reading > 0").set_index("reading").holds.astype(bool)
         for label in _strongest(sensitivity, claim, 2)["input"]:
-            names, which = _answers(by_label[label], places[label].loc[holds.index].to_numpy())
+            names, which, holds = _by_answer(verdicts, claim, label)
             cells = [f"{name}: {share_of(holds[which == i])}" for i, name in enumerate(names)]
             rows.append((claim, label, "; ".join(cells)))
     return table(("statement", "question", "holds in (95 % interval), by answer"), rows)
@@ -211,7 +225,7 @@ def questions_table(published: Path) -> str:
     sensitivity, default = csv_of(published, MULTIVERSE.name, "sensitivity"), values_at(default_unit())
     rows = []
     for reading in READINGS:
-        of_question = sensitivity.query("input == @reading.label").nlargest(1, "total")
+        of_question = sensitivity.query("input == @reading.label and surrogate_error < @_BLIND").nlargest(1, "total")
         decides = "".join(
             f"{most['claim']}: {most['total']:.2f} ({most['total_low']:.2f} to {most['total_high']:.2f})"
             for _, most in of_question.iterrows()
@@ -222,32 +236,6 @@ def questions_table(published: Path) -> str:
     return table(("field", "question", "default", "searched", "decides most (total-order index)"), rows)
 
 
-def huber_list(published: Path) -> str:
-    """What the Huber loss does to the learners of the target, by where it turns linear."""
-    means = csv_of(published, HUBER, HUBER).pivot_table(index=["x", "algorithm"], columns="panel", values="mean")
-
-    def what_of(name: str, x: float) -> str:
-        reward, packets, missed = means.loc[(x, name)]
-        return f"{short(reward)} per slot, {short(packets)} packets per episode, miss detection {percent(missed)}"
-
-    deltas = means.index.get_level_values("x").to_numpy(float)
-    first, last = float(deltas.min()), float(deltas.max())
-    sentences = []
-    for x in (first, last):
-        learners = (f"{style.LOOKS[name].label} {what_of(name, x)}" for name in ("ddqn", "dpr", "tlwd"))
-        sentences.append(f"delta = {x:g}: {'; '.join(learners)}.")
-    explored = short(means.loc[(first, "explored")].iloc[0])
-    optimum = f"The optimal policy: {what_of('optimum', first)}; with the learners' exploration {explored}."
-    return listed([*sentences, optimum])
-
-
-def short(value: object) -> str:
-    """A name, or a number with three digits, or with all of those before the point."""
-    if not isinstance(value, int | float):
-        return str(value)
-    return f"{value:.0f}" if abs(value) >= 1000 else f"{value:.3g}"
-
-
 BLOCKS: dict[str, Callable[[Path], str]] = {
     "readings": readings_list,
     "extremes": extremes_list,
@@ -256,6 +244,5 @@ BLOCKS: dict[str, Callable[[Path], str]] = {
     "judged_table": judged_table,
     "questions": questions_table,
     "answers": answers_table,
-    "huber": huber_list,
 }
 """Name of a marked part to what makes it from the folder of published results."""

@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from paper_figs import readings_text, reconstruction_text
+from paper_figs import mechanisms_text, readings_text, reconstruction_text, trade_off_text
 from paper_figs.claims import words
 from paper_figs.claims.judge import VERDICTS, Judgement, from_json
 from paper_figs.claims.learning_table import LABELS
 from paper_figs.claims.table import TITLES, number_of
 from paper_figs.markdown import listed, percent, table, wrapped
-from paper_figs.readings_text import FIGURES
+from paper_figs.published import FIGURES
 
 ROBUSTNESS, CALIBRATION = "robustness", "calibration"
 """Folders of published results: of the robustness study, and of `paper_figs.calibration`."""
@@ -254,6 +254,8 @@ BLOCKS: dict[str, Callable[[Path], str]] = {
     "robustness": robustness_list,
     "calibration": calibration_list,
     **readings_text.BLOCKS,
+    **mechanisms_text.BLOCKS,
     **reconstruction_text.BLOCKS,
+    **trade_off_text.BLOCKS,
 }
 """Name of a marked part to what makes it from the folder of published results."""

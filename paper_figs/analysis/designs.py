@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from paper_figs.analysis.convergence import sample_complexity
 from paper_figs.analysis.statistics import mean_over_seeds
 from paper_figs.plots import points
 
@@ -25,6 +26,27 @@ def table(data: xr.Dataset, name: str, columns: tuple[str, ...], slots: int) -> 
     for column in reversed(columns):
         numbers.insert(3, column, data[column].values[numbers.point])
     return numbers
+
+
+def convergence(data: xr.Dataset, columns: tuple[str, ...]) -> pd.DataFrame:
+    """When each learner's policies converge at each point, with 95 % limits; see `sample_complexity`.
+
+    `reached` is the share of runs that do within this study's episodes, `median` the episode by which half of them
+    have, infinite where fewer than half do.
+
+    Args:
+      data: results of a sweep.
+      columns: coordinates that vary.
+    """
+    rows = []
+    for name in map(str, data["algorithm"].values):
+        for point in range(data.sizes["point"]):
+            found = sample_complexity(data, name, point)
+            row = {column: float(data[column].values[point]) for column in columns} | {"algorithm": name}
+            for of in ("reached", "median"):
+                row |= dict(zip((of, f"{of}_low", f"{of}_high"), map(float, getattr(found, of)), strict=True))
+            rows.append(row | {"n_seeds": data.sizes["seed"], "episodes": data.sizes["episode"]})
+    return pd.DataFrame(rows)
 
 
 def differences(data: xr.Dataset, columns: tuple[str, ...]) -> pd.DataFrame:

@@ -9,6 +9,7 @@ How often intervals are right is simulated by `python -m paper_figs.calibration`
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -164,6 +165,30 @@ def _least_share(count: np.ndarray, n: np.ndarray, error: float) -> np.ndarray:
         return (as_many + more) / 2 < error
 
     return np.where(some, _edge(too_rare, np.zeros(count.shape), np.ones(count.shape)), 0.0)
+
+
+def clustered_share(holds: np.ndarray, clusters: np.ndarray) -> Interval:
+    """Share of points that hold, with limits for points that come in clusters.
+
+    The binomial law is that of as many independent points as would give the variance between clusters, fewer for the
+    few degrees of freedom that this variance has, and never more than there are (Korn and Graubard 1998, Survey
+    Methodology 24). One cluster, or points that all agree, say nothing of a variance between clusters.
+
+    Args:
+      holds: [points], true where a point counts.
+      clusters: [points], what points have in common.
+    """
+    holds = np.asarray(holds, float)
+    n, share = len(holds), float(holds.mean()) if len(holds) else math.nan
+    _, places = np.unique(clusters, return_inverse=True)
+    number = int(places.max(initial=-1)) + 1
+    effective = float(n)
+    if number > 1 and 0 < share < 1:
+        of_clusters = np.bincount(places, holds - share) / n
+        variance = number / (number - 1) * float(np.square(of_clusters).sum())
+        fewer = float(stats.t.isf(ERROR, n - 1) / stats.t.isf(ERROR, number - 1)) ** 2
+        effective = n if variance == 0 else min(n, share * (1 - share) / variance * fewer)
+    return proportion_effect(share * effective if n else 0.0, effective)
 
 
 def interquartile_mean(values: np.ndarray, error: float = ERROR) -> Interval:

@@ -144,11 +144,14 @@ def _cross_validated(whole: Any, x: np.ndarray, y: np.ndarray, folds: np.ndarray
 
 
 def _interval(value: np.ndarray, without: list[np.ndarray], of_integral: np.ndarray) -> np.ndarray:
-    """Value and limits [3, n], from the values without each fold and the standard error of the integrals."""
+    """Value and limits [3, n], from the values without each fold and the standard error of the integrals.
+
+    An index is a share; estimates outside of 0 to 1 become the nearest one.
+    """
     held, number = np.stack(without), len(without)
     spread = (number - 1) / number * np.square(held - held.mean(axis=0)).sum(axis=0)
     half = stats.t.ppf(0.975, number - 1) * np.sqrt(spread + np.square(of_integral))
-    return np.stack([value, np.maximum(value - half, 0.0), np.minimum(value + half, 1.0)])
+    return np.clip([value, value - half, value + half], 0.0, 1.0)
 
 
 class _Design:

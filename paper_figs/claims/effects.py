@@ -6,9 +6,10 @@ All differences are paired: learners share their seeds.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -35,6 +36,19 @@ class Measured(NamedTuple):
 
 
 Effect = Callable[[Results], Measured]
+
+
+def learners_of(effect: Effect) -> frozenset[str]:
+    """Names of the learners that an effect compares."""
+    values = {f.name: getattr(effect, f.name) for f in dataclasses.fields(effect)}  # pyright: ignore[reportArgumentType]
+    names = [values[field] for field in ("of", "over", "against", "than") if field in values]
+    agents = [name for value in names for name in (value if type(value) is tuple else (value,))]
+    return frozenset(a.name if isinstance(a, Agent) else a for a in agents if isinstance(a, Agent | str))
+
+
+def metric_of(effect: Effect) -> str:
+    """What an effect is about: reward, by which convergence is judged, too, throughput or miss detection."""
+    return getattr(effect, "metric", "reward")
 
 
 def _scaled(results: Results, metric: str, a: np.ndarray, b: np.ndarray, points: np.ndarray) -> tuple[Interval, ...]:
@@ -110,12 +124,13 @@ class LargestReduction:
 
     of: str
     against: str
+    metric: ClassVar[str] = "miss_detection"
 
     def __call__(self, results: Results) -> Measured:
         points = results.points()
-        mine, other = (results.score("miss_detection", name)[:, points] for name in (self.of, self.against))
-        differences = _scaled(results, "miss_detection", mine, other, points)
-        return Measured(up_to(mine, other), "miss_detection", differences)
+        mine, other = (results.score(self.metric, name)[:, points] for name in (self.of, self.against))
+        differences = _scaled(results, self.metric, mine, other, points)
+        return Measured(up_to(mine, other), self.metric, differences)
 
 
 @dataclass(frozen=True)

@@ -60,12 +60,15 @@ def draw_decisive(sensitivity: pd.DataFrame) -> Figure:
     figure = Figure(figsize=(style.TWO_COLUMNS[0], 0.115 * len(total) + 2.0))
     axes = figure.subplots()
     picture = axes.imshow(total, cmap="viridis", vmin=0, vmax=1, aspect="auto")
+    axes.set_facecolor("0.9")  # where a question cannot act on a statement, there is no index
     axes.set_xticks(range(total.shape[1]), list(total.columns), rotation=90, fontsize=5)
     axes.set_yticks(range(len(total)), [f"{claim}, error {error[claim]:.2f}" for claim in total.index], fontsize=5)
     axes.tick_params(length=0)
     axes.grid(visible=False)
     figure.colorbar(picture, ax=axes, label="total-order index", shrink=0.5)
-    figure.suptitle("What decides each effect (error: of the surrogate, cross-validated, over the variance)")
+    figure.suptitle(
+        "What decides each effect (grey: cannot act on it; error: of the surrogate, cross-validated, over the variance)"
+    )
     return figure
 
 

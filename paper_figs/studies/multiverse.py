@@ -9,15 +9,16 @@ import pandas as pd
 import xarray as xr
 from matplotlib.figure import Figure
 
-from paper_figs.analysis.intervals import proportion_effect
+from paper_figs.analysis.intervals import Interval, clustered_share
 from paper_figs.analysis.sensitivity import LEAST_POINTS, sensitivity
-from paper_figs.claims.judge import Judgement, is_on_its_side
+from paper_figs.claims.effects import learners_of, metric_of
+from paper_figs.claims.judge import Claim, Judgement, is_on_its_side
 from paper_figs.claims.results import Rules
 from paper_figs.claims.table import CLAIMS, claims_of, number_of
 from paper_figs.cores import on_cores
 from paper_figs.plots import readings as plot
 from sweeps.studies.multiverse import POINTS
-from sweeps.studies.readings import PER_BLOCK, READINGS, range_of, unit_of, values_at
+from sweeps.studies.readings import PER_BLOCK, READINGS, SOURCE, Reading, range_of, unit_of, values_at
 
 FIGURES = ("fig5b", "fig6", "fig7", "fig8", "fig9")
 VERDICTS = ("supported", "contradicted", "undecided")
@@ -70,22 +71,26 @@ def agreement(of_reading: pd.DataFrame) -> pd.Series:
     return of_reading.holds.astype(bool).groupby(of_reading.claim.map(number_of), sort=False).mean()
 
 
+def share_of(holds: pd.Series, readings: pd.Series | pd.Index) -> Interval:
+    """The share of readings in which something holds; those of a block have in common what decides code."""
+    return clustered_share(holds.to_numpy(bool), readings.to_numpy(int) // PER_BLOCK)
+
+
 def shares(found: pd.DataFrame) -> pd.DataFrame:
     """One row per claim: the share of readings where it holds; of those with seeds enough, that of each verdict.
 
     A claim is `unknown` where it has no effect, as where no run that it compares ever converges.
-    The limits are of 95 %; `readings` and `judged` count what the shares are of.
+    The limits are of 95 %, for readings that come in blocks; `readings` and `judged` count what the shares are of.
     """
     rows = []
     for claim, of_claim in found.groupby("claim", sort=False):
         judged = of_claim[of_claim.n_seeds >= Rules().least_seeds]
         row: dict[str, object] = {"claim": claim, "readings": len(of_claim), "judged": len(judged)}
-        counts = {"holds": (of_claim.holds.astype(bool).sum(), len(of_claim))}
-        counts["unknown"] = np.isnan(of_claim.value.to_numpy(float)).sum(), len(of_claim)
-        counts |= {verdict: ((judged.verdict == verdict).sum(), len(judged)) for verdict in VERDICTS}
-        counts["negligible"] = (judged.negligible == True).sum(), len(judged)  # noqa: E712
-        for name, (count, number) in counts.items():
-            share = proportion_effect(int(count), number) if number else (np.nan,) * 3
+        found_in = {"holds": (of_claim, of_claim.holds.astype(bool)), "unknown": (of_claim, of_claim.value.isna())}
+        found_in |= {verdict: (judged, judged.verdict == verdict) for verdict in VERDICTS}
+        found_in["negligible"] = judged, judged.negligible == True  # noqa: E712
+        for name, (of, holds) in found_in.items():
+            share = share_of(holds, of.reading) if len(of) else (np.nan,) * 3
             row |= dict(zip((name, f"{name}_low", f"{name}_high"), map(float, share), strict=True))
         rows.append(row)
     return pd.DataFrame(rows)
@@ -118,20 +123,41 @@ def places(number: int) -> pd.DataFrame:
     return pd.DataFrame(unit, columns=[reading.label for reading in READINGS])
 
 
-def decisive(found: pd.DataFrame) -> dict[str, pd.DataFrame]:
-    """Sensitivity indices of each claim's effect over the readings, and interactions of its three strongest ones."""
+def can_act(question: Reading, claim: Claim) -> bool:
+    """Whether a question's answer can move a claim's effect: through a learner that reads it and what it counts."""
+    learners = learners_of(claim.measure)
+    if question.metrics and metric_of(claim.measure) not in question.metrics:
+        return False
+    if question.path == SOURCE and claim.sweep == "fig5a":
+        return True  # there it says whether learners have the answers to all other questions, or Table I's
+    return not question.learners or bool(learners & set(question.learners))
+
+
+def decisive(found: pd.DataFrame, episodes: int) -> dict[str, pd.DataFrame]:
+    """Sensitivity indices of each claim's effect over the readings, and interactions of its three strongest ones.
+
+    Only questions that can act on a claim are asked, see `can_act`. What never converges counts as the last episode.
+
+    Args:
+      found: see `verdicts`.
+      episodes: length of the runs.
+    """
     sampled = found.query("reading > 0")  # reading 0 is the default and no point of the sample
-    sampled = sampled[np.isfinite(sampled.value.to_numpy(float))]
+    sampled = sampled.assign(value=sampled.value.replace(np.inf, episodes)).dropna(subset="value")
     inputs = places(int(found.reading.max()) + 1)
-    by_claim = {str(claim): sampled[sampled.claim == claim] for claim in found.claim.unique()}
-    enough = {claim: of_claim for claim, of_claim in by_claim.items() if len(of_claim) >= LEAST_POINTS}
-    tables = on_cores(_decisive, ((claim, of_claim, inputs) for claim, of_claim in enough.items()))
+    of_claims = ((claim, sampled[sampled.claim == claim.claim]) for claim in CLAIMS)
+    enough = [(claim, of_claim, inputs) for claim, of_claim in of_claims if len(of_claim) >= LEAST_POINTS]
+    tables = on_cores(_decisive, enough)
     return {name: pd.concat(t[name] for t in tables) for name in ("sensitivity", "interactions")} if enough else {}
 
 
-def _decisive(claim: str, of_claim: pd.DataFrame, inputs: pd.DataFrame) -> dict[str, pd.DataFrame]:
+def _decisive(claim: Claim, of_claim: pd.DataFrame, inputs: pd.DataFrame) -> dict[str, pd.DataFrame]:
     """`decisive` of one claim."""
     numbers = of_claim.reading.to_numpy(int)
-    indices = sensitivity(inputs.loc[numbers], of_claim.value.to_numpy(float), blocks=numbers // PER_BLOCK)
-    about = {"claim": claim, "surrogate": indices.surrogate, "surrogate_error": indices.error}
-    return {"sensitivity": indices.table.assign(**about), "interactions": indices.pairs.assign(claim=claim)}
+    asked = [reading.label for reading in READINGS if can_act(reading, claim)]
+    indices = sensitivity(inputs.loc[numbers, asked], of_claim.value.to_numpy(float), blocks=numbers // PER_BLOCK)
+    about = {"claim": claim.claim, "readings": len(numbers), "surrogate": indices.surrogate}
+    return {
+        "sensitivity": indices.table.assign(**about, surrogate_error=indices.error),
+        "interactions": indices.pairs.assign(claim=claim.claim),
+    }

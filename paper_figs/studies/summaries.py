@@ -65,7 +65,7 @@ def summarise_multiverse(sweeps: tuple[Sweep, ...], size: Size, out: Path, keep:
     tables = {
         "readings": multiverse.readings(found.reading.unique().tolist()),
         "claims": multiverse.shares(found),
-        **multiverse.decisive(found),
+        **multiverse.decisive(found, size.episodes),
     }
     pictures = style.save(readings.draw_shares(tables["claims"]), folder / "claims")
     if "sensitivity" in tables:

@@ -53,7 +53,7 @@ class Options:
     source: Annotated[str, tyro.conf.arg(metavar="same|table1")] = SOURCES[0]
     """Hyperparameters and settings of the source agents: the same as at the point, or Table I's."""
     learners: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("ddqn",)
-    """Any of round_robin, q_learning, ddqn, dpr, tlwd. The last two bring source agents, trained as in the paper."""
+    """Any of round_robin, q_learning, ddqn, dpr, tlwd. The last two bring source agents, see --source."""
     base: Annotated[str, tyro.conf.arg(metavar="NAME|FILE")] = "target"
     """The environment around which to vary: source, target, or a TOML file."""
     folder: Annotated[str, tyro.conf.arg(name="name", metavar="NAME")] = CUSTOM

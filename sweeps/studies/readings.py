@@ -37,44 +37,55 @@ class Reading(NamedTuple):
     """In figures and tables."""
     where: Range | None = None
     """The range; all of its readings, by their index, if None."""
-    scope: str = ""
-    """The learner that alone reads it, if there is one."""
+    learners: tuple[str, ...] = ()
+    """Who reads it; everybody if empty."""
+    metrics: tuple[str, ...] = ()
+    """What it changes the count of; if empty, it changes what happens, and so everything."""
 
 
 def _levels(*values: float) -> Range:
     return Range(0.0, 0.0, levels=values)
 
 
+_DEEP = ("ddqn", "dpr", "tlwd")
+_TRANSFER = ("dpr", "tlwd")
+_TLWD = ("tlwd",)
+_TABLE = ("q_learning",)
+_EXPLORING = (*_TABLE, *_DEEP)
+
+
 READINGS: tuple[Reading, ...] = (
-    Reading("hparams.learning_rate", "step size (SGD: a hundredth)", Range(1e-6, 1e-2, is_log=True)),
-    Reading("config.optimiser", "optimiser"),
-    Reading("hparams.epsilon_slots", "slots of exploration", Range(20.0 * _SLOTS, 600.0 * _SLOTS, is_log=True)),
-    Reading("hparams.exploration", "fall of epsilon"),
-    Reading("hparams.initialiser", "initialiser"),
-    Reading("hparams.loss", "loss"),
-    Reading("config.gradient_clipping", "clipping of gradients"),
-    Reading("config.target_update", "target network"),
+    Reading("hparams.learning_rate", "step size (SGD: a hundredth)", Range(1e-6, 1e-2, is_log=True), _DEEP),
+    Reading("config.optimiser", "optimiser", learners=_DEEP),
+    Reading(
+        "hparams.epsilon_slots", "slots of exploration", Range(20.0 * _SLOTS, 600.0 * _SLOTS, is_log=True), _EXPLORING
+    ),
+    Reading("hparams.exploration", "fall of epsilon", learners=_EXPLORING),
+    Reading("hparams.initialiser", "initialiser", learners=_DEEP),
+    Reading("hparams.loss", "loss", learners=_DEEP),
+    Reading("config.gradient_clipping", "clipping of gradients", learners=_DEEP),
+    Reading("config.target_update", "target network", learners=_DEEP),
     Reading("env.event_model", "events"),
     Reading("env.reward_state", "state of the reward"),
     Reading("env.speed.event_probability.low", "p_0^v", _levels(0.005, 0.05)),
-    Reading("env.count_event_packets", "packets with an event count", _levels(1.0, 0.0)),
-    Reading("env.miss_convention", "miss detection on data"),
+    Reading("env.count_event_packets", "packets with an event count", _levels(1.0, 0.0), metrics=("throughput",)),
+    Reading("env.miss_convention", "miss detection on data", metrics=("miss_detection",)),
     Reading("env.radar.distance", "distance of objects"),
     Reading("env.radar.counting_rule", "counting rule"),
     Reading("env.radar.count_model", "number of objects"),
     Reading("env.all.persistence", "persistence of factors", Range(0.0, 0.95)),
-    Reading("env.terminal_time_limit", "time limit is terminal", _levels(0.0, 1.0)),
-    Reading("hparams.step_exponent", "Q-learning's exponent", Range(0.51, 1.0), "q_learning"),
-    Reading("hparams.step_constant", "Q-learning's constant step", _levels(0.0, 0.01, 0.1), "q_learning"),
-    Reading("hparams.initial_weights", "TLwD's initial weights"),
-    Reading(SOURCE, "source's hyperparameters"),
-    Reading("config.n_step", "n of returns", _levels(10.0, 1.0, 5.0, 20.0), "tlwd"),
-    Reading("hparams.margin", "margin", Range(0.1, 100.0, is_log=True), "tlwd"),
-    Reading("hparams.margin_weight", "weight of the margin", Range(0.1, 100.0, is_log=True), "tlwd"),
-    Reading("hparams.demonstration_constant", "demonstrations' priority", Range(0.0, 10.0), "tlwd"),
-    Reading("hparams.demonstration_rewards", "demonstrations' rewards", scope="tlwd"),
-    Reading("hparams.importance_start", "first beta", Range(0.0, 1.0), "tlwd"),
-    Reading("hparams.importance_over", "updates that beta rises over", scope="tlwd"),
+    Reading("env.terminal_time_limit", "time limit is terminal", _levels(0.0, 1.0), _EXPLORING),
+    Reading("hparams.step_exponent", "Q-learning's exponent", Range(0.51, 1.0), _TABLE),
+    Reading("hparams.step_constant", "Q-learning's constant step", _levels(0.0, 0.01, 0.1), _TABLE),
+    Reading("hparams.initial_weights", "TLwD's initial weights", learners=_TLWD),
+    Reading(SOURCE, "source's hyperparameters", learners=_TRANSFER),
+    Reading("config.n_step", "n of returns", _levels(10.0, 1.0, 5.0, 20.0), _TLWD),
+    Reading("hparams.margin", "margin", Range(0.1, 100.0, is_log=True), _TLWD),
+    Reading("hparams.margin_weight", "weight of the margin", Range(0.1, 100.0, is_log=True), _TLWD),
+    Reading("hparams.demonstration_constant", "demonstrations' priority", Range(0.0, 10.0), _TLWD),
+    Reading("hparams.demonstration_rewards", "demonstrations' rewards", learners=_TLWD),
+    Reading("hparams.importance_start", "first beta", Range(0.0, 1.0), _TLWD),
+    Reading("hparams.importance_over", "updates that beta rises over", learners=_TLWD),
 )
 """All questions, and where their answers are searched."""
 

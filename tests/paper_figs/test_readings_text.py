@@ -6,7 +6,8 @@ import math
 import pandas as pd
 import pytest
 
-from paper_figs import publish, readings_text, readme, reconstruction_text
+from paper_figs import mechanisms_text, publish, readings_text, readme, reconstruction_text, trade_off_text
+from paper_figs.published import NAMED
 from paper_figs.studies import multiverse
 from sweeps.preset import preset_of
 from sweeps.studies.readings import READINGS, SOURCE, unit_of, values_at
@@ -25,7 +26,7 @@ def published(tmp_path):
             limits |= {name: of, f"{name}_low": of - 0.1, f"{name}_high": of + 0.1}
         return {"claim": claim, "readings": 400, "judged": 2} | limits
 
-    claims = [share(claim, 0.5) for claim in readings_text.NAMED] + [share("C2 (everywhere)", 0.99), share("C4", 0.01)]
+    claims = [share(claim, 0.5) for claim in NAMED] + [share("C2 (everywhere)", 0.99), share("C4", 0.01)]
     index = {"first": 0.1, "first_low": 0.0, "first_high": 0.2, "surrogate": "gaussian", "surrogate_error": 0.25}
     sensitivity = [
         {"claim": "C3 (TLwD)", "input": STEP, "total": 0.8, "total_low": 0.7, "total_high": 0.9} | index,
@@ -167,7 +168,7 @@ def test_every_question_stands_in_one_table_by_field(published):
 
 def test_every_statement_has_what_decides_it(published):
     rows = readings_text.decided_table(published).splitlines()[2:]
-    assert len(rows) == len(readings_text.NAMED) + 2
+    assert len(rows) == len(NAMED) + 2
     assert f"| C3 (TLwD) | 50 % (45 to 55), unknown in 30 % | {STEP} 0.80 | 0.25 |" in rows
 
 
@@ -210,7 +211,7 @@ def test_promise_and_confirmation_stand_side_by_side(published):
 
 
 def test_where_there_is_a_trade_off_and_what_fits_best_there(published):
-    text = " ".join(reconstruction_text.trade_off_list(published).split())
+    text = " ".join(trade_off_text.trade_off_list(published).split())
     assert "In 50 % (" in text  # of the default and one reading of a multiverse
     assert (
         "no single action is optimal in the target: the best one loses at least 8 %; in all others at most 0 %." in text
@@ -226,7 +227,7 @@ def test_where_there_is_a_trade_off_and_what_fits_best_there(published):
 
 
 def test_an_agent_that_imitates_is_said_to(published):
-    text = " ".join(reconstruction_text.trade_off_list(published).split())
+    text = " ".join(trade_off_text.trade_off_list(published).split())
     weights = "Weight of the margin: 0.5 (default: 0.5); demonstrations' rewards: 0.5 (default: 0.5)."
     assert f"One action in every state loses 5 % of its optimum (default: 8 %). {weights} Supported: " in text
     file = published / "reconstruction" / "tried.csv"
@@ -236,7 +237,7 @@ def test_an_agent_that_imitates_is_said_to(published):
         "unused",
     ]
     tried.to_csv(file, index=False)
-    text = " ".join(reconstruction_text.trade_off_list(published).split())
+    text = " ".join(trade_off_text.trade_off_list(published).split())
     assert (
         "Weight of the margin: 95 (default: 0.5); demonstrations' rewards: unused (default: 0.5), so TLwD does" in text
     )
@@ -254,7 +255,7 @@ def test_the_first_page_says_how_many_readings_have_a_trade_off(published):
 def test_a_space_without_a_trade_off(published):
     path = published / "reconstruction" / "tried.csv"
     pd.read_csv(path).assign(lost_by_one_action=0.0).to_csv(path, index=False)
-    text = reconstruction_text.trade_off_list(published)
+    text = trade_off_text.trade_off_list(published)
     assert text == "- One action in every state is optimal in the target of all 2 readings."
 
 
@@ -276,7 +277,7 @@ def test_what_is_not_yet_run_with_fresh_seeds_is_said(published):
     confirmed[confirmed.best_for != "trade-off C5"].to_csv(path, index=False)
     text = " ".join(reconstruction_text.best_list(published).split())
     assert "Fresh seeds in the best readings for C5, trade-off are still to come." in text
-    trade_off = " ".join(reconstruction_text.trade_off_list(published).split())
+    trade_off = " ".join(trade_off_text.trade_off_list(published).split())
     assert trade_off.endswith("reading 1 of the search agrees best with the text; its fresh seeds are still to come.")
     assert "support:" not in text
     rows = reconstruction_text.confirmed_table(published).splitlines()[2:]
@@ -291,7 +292,7 @@ def test_a_search_that_began_without_a_multiverse_has_no_default_to_stand_beside
 
 
 def test_what_the_loss_does_is_what_the_table_holds(published):
-    text = " ".join(readings_text.huber_list(published).split())
+    text = " ".join(mechanisms_text.huber_list(published).split())
     assert "- delta = 1: DDQN 1.5 per slot, 1.5 packets per episode, miss detection 150 %; DPR 2.5 per slot" in text
     assert "- delta = 100: DDQN 100 per slot" in text
     assert "The optimal policy: 4.5 per slot, 4.5 packets per episode, miss detection 450 %" in text
@@ -303,7 +304,7 @@ def test_a_sweep_is_published_without_its_parts(published, tmp_path):
     root.mkdir()
     for name in ("huber.pdf", "huber.png", "manifest.json", "seeds-000000-000009.nc"):
         (published / "huber" / name).write_text(name)
-    assert publish.main([f"--huber={published / 'huber'}", f"--root={root}"]) == 0
+    assert publish.main([f"--custom={published / 'huber'}", f"--root={root}"]) == 0
     found = {path.name for path in (root / "published" / "huber").iterdir()}
     assert found == {"huber.csv", "huber.pdf", "huber.png", "manifest.json"}
 

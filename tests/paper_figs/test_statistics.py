@@ -7,6 +7,7 @@ from scipy import stats
 from paper_figs.analysis import statistics
 from paper_figs.analysis.censored import earlier, reached_by, typical
 from paper_figs.analysis.intervals import (
+    clustered_share,
     interquartile_mean,
     mean_effect,
     probability_of_improvement,
@@ -222,3 +223,24 @@ def test_ties_everywhere_leave_the_median_without_width():
 
 def test_reached_by_counts_runs_in_a_band():
     assert reached_by(np.array([10.0, 75.0, 225.0, 226.0, np.inf]), 75, 225) == proportion_effect(2, 5)
+
+
+def test_a_share_of_points_in_clusters_has_an_interval_that_holds_the_truth():
+    rng, clusters, right, naive = np.random.default_rng(3), np.repeat(np.arange(8), 64), 0, 0
+    for _ in range(400):
+        chances = rng.beta(2, 3, size=8)  # 0.4 on average, and other in each cluster
+        holds = rng.random(len(clusters)) < chances[clusters]
+        _, low, high = clustered_share(holds, clusters)
+        right += low <= 0.4 <= high
+        _, low, high = proportion_effect(holds.sum(), len(holds))
+        naive += low <= 0.4 <= high
+    assert 0.92 <= right / 400 <= 0.99
+    assert naive / 400 < 0.7
+
+
+def test_clusters_without_a_variance_between_them_are_single_points():
+    holds = np.arange(40) % 4 == 0
+    assert clustered_share(holds, np.zeros(40)) == proportion_effect(10, 40)
+    assert clustered_share(holds, np.arange(40) // 8) == proportion_effect(10, 40)  # more alike than chance makes them
+    assert clustered_share(np.zeros(40), np.arange(40) // 8) == proportion_effect(0, 40)
+    assert np.isnan(clustered_share(np.zeros(0), np.zeros(0)).value)

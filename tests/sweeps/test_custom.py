@@ -1,5 +1,7 @@
 """Sweeps of one's own: any parameter by its path, any values, and what is refused before anything is run."""
 
+import math
+
 import jax
 import numpy as np
 import pandas as pd
@@ -325,3 +327,61 @@ def test_one_command_runs_and_draws_it(capsys, tmp_path):
     other = ["run", "custom", "--vary", "env.event_model=marginal,conditional", *size, "--resume"]
     assert main(other) == 2
     assert "holds results of another configuration" in capsys.readouterr().err
+
+
+@pytest.fixture
+def summary_of(tmp_path, capsys):
+    """Runs a custom sweep of Q-learning, which compiles fast; returns its folder."""
+
+    def run(*options):
+        size = ["--learners", "q_learning", "round_robin", "--smoke", "--episodes", "1", "--out", str(tmp_path)]
+        assert main(["run", "custom", *options, *size]) == 0
+        written = capsys.readouterr().out
+        folder = tmp_path / "custom"
+        assert all(str(path) in written for path in folder.glob("custom*"))
+        return folder
+
+    return run
+
+
+def test_two_parameters_give_maps_and_where_learners_differ(summary_of):
+    folder = summary_of("--vary", "env.speed.event_probability.high=0.2,0.8", "--vary", "hparams.discount=0.5,0.7,0.9")
+    numbers, between, converged = (
+        pd.read_csv(folder / f"custom{of}.csv") for of in ("", "-differences", "-convergence")
+    )
+    axes = ["env.speed.event_probability.high", "hparams.discount"]
+    assert len(numbers[axes].drop_duplicates()) == 6
+    data = xr.load_dataset(folder / "seeds-000000-000001.nc", engine="h5netcdf")
+    assert set(between.other) == {"round_robin"}
+    for at in between.query("panel == 'a'").to_dict("records"):
+        point = data.isel(point=at["point"])
+        assert [float(point[axis]) for axis in axes] == pytest.approx([at[axis] for axis in axes])
+        gap = point["reward"].sel(algorithm="q_learning") - point["reward"].sel(algorithm="round_robin")
+        assert at["mean"] == pytest.approx(float(gap.mean()), rel=1e-4)
+        assert bool(at["significant"]) == (not at["ci_low"] <= 0 <= at["ci_high"])
+    assert len(converged) == 2 * 6
+    assert (converged.reached == 0).all()  # within a single episode nobody shows that it stays
+    assert (converged["median"] == math.inf).all()
+    for metric in ("reward", "throughput", "miss-detection"):
+        assert (folder / f"custom-{metric}.pdf").stat().st_size > 0
+
+
+def test_a_sample_gives_profiles_and_what_decides(summary_of):
+    ranges = ("--vary", "env.speed.event_probability.high=0.05:0.9", "--vary", "hparams.margin=0.1:10:log")
+    folder = summary_of(*ranges, "--sample", "32", "--seed", "3")
+    assert len(pd.read_csv(folder / "custom.csv").point.unique()) == 32
+    found = pd.read_csv(folder / "custom-sensitivity.csv").query("algorithm == 'Round Robin'").set_index("input")
+    # Its policy reads no hyperparameter, so that its reward is the events' alone.
+    assert found.total["env.speed.event_probability.high"] > 0.8
+    assert found.total["hparams.margin"] < 0.2
+    assert (folder / "custom-sensitivity.pdf").stat().st_size > 0
+
+
+def test_a_table_is_run_point_by_point(summary_of, tmp_path):
+    table = tmp_path / "points.csv"
+    table.write_text("env.speed.event_probability.high,hparams.discount\n0.2,0.9\n0.8,\n,0.5\n")
+    folder = summary_of("--table", str(table))
+    numbers = pd.read_csv(folder / "custom.csv").drop_duplicates("point").set_index("point")
+    default = float(jrcjax.HParams().discount)
+    rows = [(0.2, 0.9), (0.8, default), (0.4, 0.5)]
+    np.testing.assert_allclose(numbers[["env.speed.event_probability.high", "hparams.discount"]], rows, rtol=1e-6)

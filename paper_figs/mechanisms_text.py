@@ -1,0 +1,71 @@
+"""The parts of texts made from published sweeps that show why a reading decides: all else in them is as by default."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from paper_figs.claims import words
+from paper_figs.claims.learning_table import LABELS
+from paper_figs.markdown import listed, percent, table
+from paper_figs.plots import style
+from paper_figs.published import csv_of, short
+
+HUBER = "huber"
+"""The published sweep of the Huber loss."""
+STEP_SIZE = "step_size"
+"""The published grid of step sizes and p_1^v."""
+_RATE, _FAST = "hparams.learning_rate", "env.speed.event_probability.high"
+_AT = 0.8  # value of p_1^v at which the paper counts episodes
+_LEARNERS = ("ddqn", "dpr", "tlwd")
+
+
+def huber_list(published: Path) -> str:
+    """What the Huber loss does to the learners of the target, by where it turns linear."""
+    means = csv_of(published, HUBER, HUBER).pivot_table(index=["x", "algorithm"], columns="panel", values="mean")
+
+    def what_of(name: str, x: float) -> str:
+        reward, packets, missed = means.loc[(x, name)]
+        return f"{short(reward)} per slot, {short(packets)} packets per episode, miss detection {percent(missed)}"
+
+    deltas = means.index.get_level_values("x").to_numpy(float)
+    first, last = float(deltas.min()), float(deltas.max())
+    sentences = []
+    for x in (first, last):
+        learners = (f"{style.LOOKS[name].label} {what_of(name, x)}" for name in ("ddqn", "dpr", "tlwd"))
+        sentences.append(f"delta = {x:g}: {'; '.join(learners)}.")
+    explored = short(means.loc[(first, "explored")].iloc[0])
+    optimum = f"The optimal policy: {what_of('optimum', first)}; with the learners' exploration {explored}."
+    return listed([*sentences, optimum])
+
+
+def step_sizes_table(published: Path) -> str:
+    """One row per step size: when policies converge at p_1^v = 0.8, and where TLwD earns more than the others."""
+    converged = csv_of(published, STEP_SIZE, f"{STEP_SIZE}-convergence")
+    between = csv_of(published, STEP_SIZE, f"{STEP_SIZE}-differences").query("panel == 'a'")
+    rows = []
+    for rate in sorted(converged[_RATE].unique()):
+        here = converged[(converged[_RATE] == rate) & np.isclose(converged[_FAST], _AT)].set_index("algorithm")
+        leads = _leads(between[between[_RATE] == rate])
+        cells = (f"{words.number(here.loc[n, 'median'])} ({percent(here.loc[n, 'reached'])})" for n in _LEARNERS)
+        rows.append((f"{rate:.3g}", *cells, *(f"{(leads[n].ci_low > 0).sum()} of {len(leads[n])}" for n in leads)))
+    head = (*(f"{LABELS[n]} converges in" for n in _LEARNERS), "TLwD earns more than DDQN", "than DPR")
+    return table(("step size", *head), rows)
+
+
+def _leads(between: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """TLwD's lead in reward over each of the others at all values of p_1^v; tables hold the pair in either order."""
+    found = {}
+    for other in ("ddqn", "dpr"):
+        lead = between[(between.algorithm == "tlwd") & (between.other == other)]
+        turned = between[(between.algorithm == other) & (between.other == "tlwd")]
+        limits = pd.DataFrame({"ci_low": -turned.ci_high, "ci_high": -turned.ci_low})
+        found[other] = pd.concat([lead[["ci_low", "ci_high"]], limits])
+    return found
+
+
+BLOCKS: dict[str, Callable[[Path], str]] = {"huber": huber_list, "step_sizes": step_sizes_table}
+"""Name of a marked part to what makes it from the folder of published results."""

@@ -1,0 +1,86 @@
+"""Questions that the paper leaves open act on those who read them, and on nobody else."""
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from jrcjax.config.paths import Range
+from jrcjax.training.transfer import TARGET_LEARNERS
+from paper_figs.claims.effects import learners_of, metric_of
+from paper_figs.claims.table import CLAIMS
+from paper_figs.studies.multiverse import can_act
+from sweeps.engine.run import run_sweep
+from sweeps.results import store
+from sweeps.studies.multiverse import block_sweep
+from sweeps.studies.readings import READINGS, SOURCE, is_static, range_of
+from sweeps.sweep import Size
+
+SIZE = Size(seeds=1, episodes=4, pretraining=50, demonstrations=300)
+METRICS = ("reward", "throughput", "miss_detection", "policy_reward")
+
+
+def another(where: Range) -> float:
+    """An answer that is no default."""
+    return where.levels[1] if where.levels else where.low + 0.6 * (where.high - where.low)
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """Source and target under the default, and under another answer to each question in turn, by path."""
+    asked = [reading for reading in READINGS if not is_static(reading)]
+    answers = {"": {}} | {r.path: {r.path: another(range_of(r))} for r in asked}
+    answers[SOURCE] |= {"hparams.discount": 0.5}
+    answers["beside the source"] = {"hparams.discount": 0.5}
+    out = tmp_path_factory.mktemp("results")
+    sweep = block_sweep("asked", range(len(answers)), list(answers.values()), points=(0,), seeds_per_part=1)
+    run_sweep(sweep, SIZE, out, Console(), resume=False)
+    found = [store.load(out / name, 1) for name in (sweep.source.name, sweep.name)]
+    return {path: [of.isel(point=i) for of in found] for i, path in enumerate(answers)}
+
+
+def differ(a, b, learner, metric):
+    return not np.array_equal(a[metric].sel(algorithm=learner), b[metric].sel(algorithm=learner), equal_nan=True)
+
+
+@pytest.mark.parametrize("question", [reading for reading in READINGS if not is_static(reading)], ids=lambda r: r.path)
+def test_a_question_acts_on_those_who_read_it_alone(question, results):
+    beside = results["beside the source"] if question.path == SOURCE else results[""]
+    source, target = zip(results[question.path], beside, strict=True)
+    changed = {(name, metric) for name in TARGET_LEARNERS for metric in METRICS if differ(*target, name, metric)}
+    readers, metrics = question.learners or TARGET_LEARNERS, question.metrics or METRICS
+    assert changed <= {(name, metric) for name in readers for metric in metrics}
+    assert changed, "nobody reads it"
+    in_source = {name for name in ("ddqn", "q_learning", "round_robin") for m in METRICS if differ(*source, name, m)}
+    assert in_source <= ({"ddqn", "q_learning"} if question.path == SOURCE else set(readers))
+
+
+def asked_of(claim):
+    (one,) = [c for c in CLAIMS if c.claim == claim]
+    return {reading.path for reading in READINGS if can_act(reading, one)}
+
+
+def test_each_claim_knows_its_learners_and_its_metric():
+    learners, metrics = ({c.claim: of(c.measure) for c in CLAIMS} for of in (learners_of, metric_of))
+    assert learners["C3 (TLwD, much)"] == {"tlwd", "ddqn"}
+    assert learners["C8 (throughput, DDQN)"] == {"tlwd", "ddqn", "dpr"}
+    assert learners["C12 (miss detection, DPR)"] == {"dpr", "ddqn"}
+    assert learners["C12 (throughput, DDQN)"] == {"ddqn"}
+    assert learners["C15 (episodes)"] == {"tlwd"}
+    assert learners["C2 (Round Robin, source)"] == {"round_robin", "ddqn", "q_learning"}
+    assert all(learners.values())
+    assert {metrics[claim] for claim in ("C9", "C14 (DPR)", "C13 (miss detection, TLwD)")} == {"miss_detection"}
+    assert metrics["C12 (throughput, TLwD)"] == "throughput"
+    assert {metrics[claim] for claim in ("C1 (stable)", "C4 (reward)", "C13 (highest)")} == {"reward"}
+
+
+def test_only_questions_that_can_act_are_asked_of_a_claim():
+    tlwd = {"hparams.margin", "config.n_step", "hparams.importance_start"}
+    assert not asked_of("C6 (fall, DDQN)") & (tlwd | {SOURCE, "hparams.step_exponent", "env.miss_convention"})
+    assert asked_of("C6 (fall, DDQN)") >= {"hparams.learning_rate", "config.optimiser", "env.radar.distance"}
+    assert asked_of("C5 (highest)") >= tlwd | {SOURCE}
+    assert SOURCE in asked_of("C1 (reached)") & asked_of("C2 (Q-learning, source)")
+    assert "hparams.learning_rate" not in asked_of("C2 (Q-learning, target)")
+    assert "hparams.step_exponent" in asked_of("C2 (Q-learning, target)")
+    counts = {"env.count_event_packets", "env.miss_convention"}
+    assert asked_of("C9") & counts == {"env.miss_convention"}
+    assert asked_of("C8 (throughput, TLwD)") & counts == {"env.count_event_packets"}
