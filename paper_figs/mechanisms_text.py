@@ -49,7 +49,7 @@ def step_sizes_table(published: Path) -> str:
     rows = []
     for rate in sorted(converged[_RATE].unique()):
         here = converged[(converged[_RATE] == rate) & np.isclose(converged[_FAST], _AT)].set_index("algorithm")
-        leads = _leads(between[between[_RATE] == rate])
+        leads = _leads(between.loc[between[_RATE] == rate])
         cells = (f"{words.number(here.loc[n, 'median'])} ({percent(here.loc[n, 'reached'])})" for n in _LEARNERS)
         rows.append((f"{rate:.3g}", *cells, *(f"{(leads[n].ci_low > 0).sum()} of {len(leads[n])}" for n in leads)))
     head = (*(f"{LABELS[n]} converges in" for n in _LEARNERS), "TLwD earns more than DDQN", "than DPR")
@@ -60,10 +60,9 @@ def _leads(between: pd.DataFrame) -> dict[str, pd.DataFrame]:
     """TLwD's lead in reward over each of the others at all values of p_1^v; tables hold the pair in either order."""
     found = {}
     for other in ("ddqn", "dpr"):
-        lead = between[(between.algorithm == "tlwd") & (between.other == other)]
-        turned = between[(between.algorithm == other) & (between.other == "tlwd")]
-        limits = pd.DataFrame({"ci_low": -turned.ci_high, "ci_high": -turned.ci_low})
-        found[other] = pd.concat([lead[["ci_low", "ci_high"]], limits])
+        lead = between.loc[(between.algorithm == "tlwd") & (between.other == other), ["ci_low", "ci_high"]]
+        turned = between.loc[(between.algorithm == other) & (between.other == "tlwd")]
+        found[other] = pd.concat([lead, pd.DataFrame({"ci_low": -turned.ci_high, "ci_high": -turned.ci_low})])
     return found
 
 

@@ -162,7 +162,7 @@ def _together(published: Path, verdicts: pd.DataFrame) -> str:
         holds = verdicts.query("claim == @claim and reading > 0").set_index("reading").holds.astype(bool)
         here = pd.Series(both[holds.index.to_numpy(int)], holds.index)
         everywhere, with_one = (
-            f"{share_of(holds[of & here])}, in all others in {share_of(holds[of & ~here])}"
+            f"{share_of(holds.loc[of & here])}, in all others in {share_of(holds.loc[of & ~here])}"
             for of in (here | True, holds.index.isin(worthwhile.index))
         )
         parts.append(f"{claim} holds in {everywhere} (with a trade-off: {with_one})")
@@ -196,7 +196,7 @@ def answers_table(published: Path) -> str:
     for claim in NAMED:
         for label in _strongest(sensitivity, claim, 2)["input"]:
             names, which, holds = _by_answer(verdicts, claim, label)
-            cells = [f"{name}: {share_of(holds[which == i])}" for i, name in enumerate(names)]
+            cells = [f"{name}: {share_of(holds.loc[which == i])}" for i, name in enumerate(names)]
             rows.append((claim, label, "; ".join(cells)))
     return table(("statement", "question", "holds in (95 % interval), by answer"), rows)
 

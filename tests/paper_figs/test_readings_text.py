@@ -110,8 +110,13 @@ def published(tmp_path):
 def test_shares_and_what_decides_are_those_of_the_tables(published):
     text = " ".join(readings_text.readings_list(published).split())
     assert "Shares of 400 readings" in text
-    assert f"- C3 (TLwD) holds in 50 % (45 to 55), unknown in 30 %; decided most by {STEP} 0.80." in text
-    assert "C5 (highest) holds in 50 % (45 to 55); decided most by no single question." in text
+    # Of the readings in the fixture's multiverse the default alone has a trade-off, and C3 does not hold in it.
+    assert "in which the estimate is on the statement's side" in text
+    assert "of the 1 of 2 in which no single action is optimal" in text
+    step = f"{STEP} 0.80 (1e-06 to 2.2e-05)"
+    assert f"| C3 (TLwD) | 50 % (45 to 55), unknown in 30 % | 0 % (0 to 95) | 0 % | 75 % | {step} |" in text
+    assert "| C5 (highest) | 50 % (45 to 55) | " in text
+    assert "| no single question |" in text
     text = " ".join(readings_text.extremes_list(published).split())
     assert "hold 1 of 6 statements: C2 (everywhere)." in text
     assert "In less than 10 % of it hold 1: C4." in text
@@ -131,10 +136,9 @@ def test_what_has_a_verdict_and_what_verdicts_say(published):
     assert "| C4 | 0 % (-10 to 10) | 75 % (65 to 85) | 25 % (15 to 35) | 0 % (-10 to 10) |" in (
         readings_text.judged_table(published)
     )
-    assert (
-        "In 2 of them, which have seeds enough for a verdict, supported and contradicted are: C3 (TLwD) 0 % and 75 %"
-        in (" ".join(readings_text.readings_list(published).split()))
-    )
+    first_page = " ".join(readings_text.readings_list(published).split())
+    assert "of verdicts in 2 with seeds enough ([all](docs/explanation/readings.md#verdicts))" in first_page
+    assert "| on its side | with a trade-off | supported | contradicted |" in first_page
 
 
 def test_readings_of_a_single_seed_have_no_verdicts(published):
@@ -153,6 +157,7 @@ def test_what_two_questions_decide_together_is_told_apart(published):
     text = " ".join(readings_text.readings_list(published).split())
     assert "C5 (highest) holds in 100 % (" in text
     assert "to 100), in all others in 0 % (0 to " in text
+    assert "(with a trade-off: not among these readings, in all others in" in text
 
 
 def test_every_question_stands_in_one_table_by_field(published):
@@ -187,6 +192,7 @@ def test_promise_and_confirmation_stand_side_by_side(published):
     assert "Of 4 readings, 2 of them proposed by the search, reading 0 of the search agrees best with the" in text
     assert "promised 3 of 7 statements (agreement 60 %, default 20 %), and 100 fresh seeds gave 1 " in text
     assert "gave 1 (agreement 20 %): 1 supported, 5 contradicted, 1 undecided." in text
+    assert "The best of those that the search proposed agrees 60 %, more than the best of the design, 40 %." in text
     assert "- It has one of the Huber loss in the target and Table I's source." in text
     assert "- In it policies converge at p_1^v = 0.8 in episode (median): TLwD 1, DPR 120, DDQN never." in text
     world = "its optimal policy sends at most 0 packets per episode (default: 200), and one action in every state earns"
@@ -194,6 +200,9 @@ def test_promise_and_confirmation_stand_side_by_side(published):
     assert "fresh seeds in the other readings support: C5 (highest)." in text
     assert "in none of the 4 readings, so in at most 77.6 % of the space: C11." in text
     assert "in none of those that were run with them: C4; C7 (TLwD); C7 (DPR); C7 (DDQN)." in text
+    assert (
+        "in none of the 2 readings of the multiverse with verdicts either, so in at most 10 % of the space: C4." in text
+    )
     first_page = " ".join(reconstruction_text.search_list(published).split())
     assert "Of 4 readings, 2 of them from a search, reading 0 of the search fits the text best:" in first_page
     assert "of 7 statements 1 supported, 5 contradicted, 1 undecided by 100 fresh seeds ([all](docs/" in first_page
@@ -246,10 +255,8 @@ def test_an_agent_that_imitates_is_said_to(published):
 def test_the_first_page_says_how_many_readings_have_a_trade_off(published):
     text = " ".join(reconstruction_text.search_list(published).split())
     assert "loses up to 25 % in it at the points of Figs. 6 to 8 (default: it loses up to 25 %). 50 % of the" in text
-    assert "where-there-is-a-trade-off) in the target: there C3 (TLwD) holds in 0 % (0 to 95), and" in text
-    assert (
-        " and reading 1 of the search fits best (1 supported, 1 contradicted, 0 undecided; C3 (TLwD) unknown)." in text
-    )
+    assert "where-there-is-a-trade-off) in the target, of which reading 1 of the search fits best (1 supported," in text
+    assert "1 contradicted, 0 undecided; C3 (TLwD) unknown)." in text
 
 
 def test_a_space_without_a_trade_off(published):
@@ -268,7 +275,7 @@ def test_a_world_where_each_statement_holds_somewhere(published):
     )
     text = " ".join(reconstruction_text.best_list(published).split())
     assert "Each statement's estimate is on its side in some of the 4 readings." in text
-    assert "in none of the" not in text
+    assert "in none of the 4 readings" not in text
 
 
 def test_what_is_not_yet_run_with_fresh_seeds_is_said(published):
@@ -297,6 +304,32 @@ def test_what_the_loss_does_is_what_the_table_holds(published):
     assert "- delta = 100: DDQN 100 per slot" in text
     assert "The optimal policy: 4.5 per slot, 4.5 packets per episode, miss detection 450 %" in text
     assert "with the learners' exploration 5.5." in text
+
+
+def test_what_the_step_size_does_is_what_the_tables_hold(tmp_path):
+    rate, fast = "hparams.learning_rate", "env.speed.event_probability.high"
+    points = [(step, p) for step in (1e-5, 1e-3) for p in (0.4, 0.8)]
+    converged = [
+        {rate: step, fast: p, "algorithm": name, "reached": reached, "median": median}
+        for step, p in points
+        for name, reached, median in (("ddqn", 0.3, math.inf), ("dpr", 1.0, 12.0), ("tlwd", 0.8, 100 * p))
+    ]
+    pairs = [("ddqn", "dpr", 0.0), ("ddqn", "tlwd", -1.0), ("dpr", "tlwd", 1.0)]
+    between = [
+        {"panel": panel, "algorithm": a, "other": b, rate: step, fast: p}
+        | {"ci_low": lead - 0.1 - (p == 0.8), "ci_high": lead + 0.1 + (step == 1e-3) * p * 1.2}
+        for step, p in points
+        for panel in "ab"
+        for a, b, lead in pairs
+    ]
+    (tmp_path / "step_size").mkdir()
+    for name, rows in {"convergence": converged, "differences": between}.items():
+        pd.DataFrame(rows).to_csv(tmp_path / "step_size" / f"step_size-{name}.csv", index=False)
+    rows = mechanisms_text.step_sizes_table(tmp_path).splitlines()[2:]
+    assert rows == [
+        "| 1e-05 | never (30 %) | 12 (100 %) | 80 (80 %) | 2 of 2 | 0 of 2 |",
+        "| 0.001 | never (30 %) | 12 (100 %) | 80 (80 %) | 1 of 2 | 0 of 2 |",
+    ]
 
 
 def test_a_sweep_is_published_without_its_parts(published, tmp_path):
