@@ -44,16 +44,38 @@ def huber_list(published: Path) -> str:
 
 def step_sizes_table(published: Path) -> str:
     """One row per step size: when policies converge at p_1^v = 0.8, and where TLwD earns more than the others."""
-    converged = csv_of(published, STEP_SIZE, f"{STEP_SIZE}-convergence")
-    between = csv_of(published, STEP_SIZE, f"{STEP_SIZE}-differences").query("panel == 'a'")
     rows = []
-    for rate in sorted(converged[_RATE].unique()):
-        here = converged[(converged[_RATE] == rate) & np.isclose(converged[_FAST], _AT)].set_index("algorithm")
-        leads = _leads(between.loc[between[_RATE] == rate])
+    for rate, (here, leads) in _by_step_size(published).items():
         cells = (f"{words.number(here.loc[n, 'median'])} ({percent(here.loc[n, 'reached'])})" for n in _LEARNERS)
         rows.append((f"{rate:.3g}", *cells, *(f"{(leads[n].ci_low > 0).sum()} of {len(leads[n])}" for n in leads)))
     head = (*(f"{LABELS[n]} converges in" for n in _LEARNERS), "TLwD earns more than DDQN", "than DPR")
     return table(("step size", *head), rows)
+
+
+def step_sizes_in_short(published: Path) -> str:
+    """With which step sizes TLwD earns more than Double DQN, and when Double DQN converges, for the first page."""
+    grid = _by_step_size(published)
+    leads = {f"{rate:.3g}": of["ddqn"] for rate, (_, of) in grid.items()}
+    ahead = [rate for rate, lead in leads.items() if (lead.ci_low > 0).all()]
+    behind = [rate for rate, lead in leads.items() if (lead.ci_high < 0).mean() > 0.5]
+    episodes = {f"{rate:.3g}": here.loc["ddqn", "median"] for rate, (here, _) in reversed(grid.items())}
+    when = ", ".join(f"{words.number(episode)} with {rate}" for rate, episode in episodes.items())
+    return (
+        "All else as by default, TLwD earns more than DDQN at every p_1^v of [a grid](docs/explanation/readings.md"
+        f"#why-a-small-step-keeps-what-was-there-before) with step sizes of {', '.join(ahead) or 'none'}, and less at "
+        f"most with {', '.join(behind) or 'none'}; at p_1^v = {_AT} DDQN converges in episode (median) {when}."
+    )
+
+
+def _by_step_size(published: Path) -> dict[float, tuple[pd.DataFrame, dict[str, pd.DataFrame]]]:
+    """By step size: when each learner converges at p_1^v = 0.8, and TLwD's leads at all values of p_1^v."""
+    converged = csv_of(published, STEP_SIZE, f"{STEP_SIZE}-convergence")
+    between = csv_of(published, STEP_SIZE, f"{STEP_SIZE}-differences").query("panel == 'a'")
+    at = converged.loc[np.isclose(converged[_FAST], _AT)]
+    return {
+        float(rate): (of_rate.set_index("algorithm"), _leads(between.loc[between[_RATE] == rate]))
+        for rate, of_rate in at.groupby(_RATE)
+    }
 
 
 def _leads(between: pd.DataFrame) -> dict[str, pd.DataFrame]:

@@ -13,6 +13,7 @@ import pandas as pd
 from jrcjax.readings import Loss
 from paper_figs.claims.results import Rules
 from paper_figs.markdown import listed, paragraph, percent, table
+from paper_figs.mechanisms_text import step_sizes_in_short
 from paper_figs.published import NAMED, csv_of, held, of_multiverse, share, share_of, tried_in
 from paper_figs.studies import multiverse
 from sweeps.design import in_range
@@ -71,7 +72,9 @@ def readings_list(published: Path) -> str:
         + (of_judged if judged else "")
         + "; and total-order indices of what decides it:"
     )
-    return f"{about}\n\n{table(head, rows)}\n\n{listed([_together(published, verdicts)])}"
+    return (
+        f"{about}\n\n{table(head, rows)}\n\n{listed([_together(published, verdicts), step_sizes_in_short(published)])}"
+    )
 
 
 def _deciding_where(verdicts: pd.DataFrame, sensitivity: pd.DataFrame, claim: str) -> str:

@@ -80,6 +80,21 @@ def published(tmp_path):
         for i, name in enumerate(("ddqn", "dpr", "tlwd", "optimum", "explored"))
         for x in (1.0, 100.0)
     ]
+    rate, fast = "hparams.learning_rate", "env.speed.event_probability.high"
+    points = [(step, p) for step in (1e-5, 1e-3) for p in (0.4, 0.8)]
+    converged = [
+        {rate: step, fast: p, "algorithm": name, "reached": reached, "median": median}
+        for step, p in points
+        for name, reached, median in (("ddqn", 0.3, math.inf), ("dpr", 1.0, 12.0), ("tlwd", 0.8, 100 * p))
+    ]
+    pairs = [("ddqn", "dpr", 0.0), ("ddqn", "tlwd", -1.0), ("dpr", "tlwd", 1.0)]
+    between = [
+        {"panel": panel, "algorithm": a, "other": b, rate: step, fast: p}
+        | {"ci_low": lead - 0.1 - (p == 0.8), "ci_high": lead + 0.1 + (step == 1e-3) * p * 1.2}
+        for step, p in points
+        for panel in "ab"
+        for a, b, lead in pairs
+    ]
     packets = {"figures": 200.0, "best": 0.0}
     figures = {
         f"{folder}/fig{number}": [
@@ -93,6 +108,8 @@ def published(tmp_path):
     }
     tables = figures | {
         "huber/huber": huber,
+        "step_size/step_size-convergence": converged,
+        "step_size/step_size-differences": between,
         "multiverse/verdicts": verdicts,
         "multiverse/claims": claims,
         "multiverse/sensitivity": sensitivity,
@@ -306,30 +323,15 @@ def test_what_the_loss_does_is_what_the_table_holds(published):
     assert "with the learners' exploration 5.5." in text
 
 
-def test_what_the_step_size_does_is_what_the_tables_hold(tmp_path):
-    rate, fast = "hparams.learning_rate", "env.speed.event_probability.high"
-    points = [(step, p) for step in (1e-5, 1e-3) for p in (0.4, 0.8)]
-    converged = [
-        {rate: step, fast: p, "algorithm": name, "reached": reached, "median": median}
-        for step, p in points
-        for name, reached, median in (("ddqn", 0.3, math.inf), ("dpr", 1.0, 12.0), ("tlwd", 0.8, 100 * p))
-    ]
-    pairs = [("ddqn", "dpr", 0.0), ("ddqn", "tlwd", -1.0), ("dpr", "tlwd", 1.0)]
-    between = [
-        {"panel": panel, "algorithm": a, "other": b, rate: step, fast: p}
-        | {"ci_low": lead - 0.1 - (p == 0.8), "ci_high": lead + 0.1 + (step == 1e-3) * p * 1.2}
-        for step, p in points
-        for panel in "ab"
-        for a, b, lead in pairs
-    ]
-    (tmp_path / "step_size").mkdir()
-    for name, rows in {"convergence": converged, "differences": between}.items():
-        pd.DataFrame(rows).to_csv(tmp_path / "step_size" / f"step_size-{name}.csv", index=False)
-    rows = mechanisms_text.step_sizes_table(tmp_path).splitlines()[2:]
+def test_what_the_step_size_does_is_what_the_tables_hold(published):
+    rows = mechanisms_text.step_sizes_table(published).splitlines()[2:]
     assert rows == [
         "| 1e-05 | never (30 %) | 12 (100 %) | 80 (80 %) | 2 of 2 | 0 of 2 |",
         "| 0.001 | never (30 %) | 12 (100 %) | 80 (80 %) | 1 of 2 | 0 of 2 |",
     ]
+    first_page = " ".join(readings_text.readings_list(published).split())
+    assert "with step sizes of 1e-05, and less at most with none; at p_1^v = 0.8 DDQN converges" in first_page
+    assert "in episode (median) never with 0.001, never with 1e-05." in first_page
 
 
 def test_a_sweep_is_published_without_its_parts(published, tmp_path):
