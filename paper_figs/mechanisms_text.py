@@ -58,13 +58,19 @@ def step_sizes_in_short(published: Path) -> str:
     leads = {f"{rate:.3g}": of["ddqn"] for rate, (_, of) in grid.items()}
     ahead = [rate for rate, lead in leads.items() if (lead.ci_low > 0).all()]
     behind = [rate for rate, lead in leads.items() if (lead.ci_high < 0).mean() > 0.5]
-    episodes = {f"{rate:.3g}": here.loc["ddqn", "median"] for rate, (here, _) in reversed(grid.items())}
-    when = ", ".join(f"{words.number(episode)} with {rate}" for rate, episode in episodes.items())
+    episodes = [(f"{rate:.3g}", float(here.loc["ddqn", "median"])) for rate, (here, _) in reversed(grid.items())]
+    last = max((i for i, (_, episode) in enumerate(episodes) if np.isfinite(episode)), default=-1)
+    when = [f"{words.number(episode)} with {rate}" for rate, episode in episodes[: last + 1]]
+    when += [f"never with {rate} or less" for rate, _ in episodes[last + 1 : last + 2]]
     return (
-        "All else as by default, TLwD earns more than DDQN at every p_1^v of [a grid](docs/explanation/readings.md"
-        f"#why-a-small-step-keeps-what-was-there-before) with step sizes of {', '.join(ahead) or 'none'}, and less at "
-        f"most with {', '.join(behind) or 'none'}; at p_1^v = {_AT} DDQN converges in episode (median) {when}."
+        f"All else as by default, TLwD earns more than DDQN at every p_1^v with step sizes of {_or_none(ahead)}, less "
+        f"at most with {_or_none(behind)}; DDQN converges at p_1^v = {_AT} (median) in episode {', '.join(when)} "
+        "([why](docs/explanation/readings.md#why-small-steps))."
     )
+
+
+def _or_none(items: list[str]) -> str:
+    return ", ".join(items) or "none"
 
 
 def _by_step_size(published: Path) -> dict[float, tuple[pd.DataFrame, dict[str, pd.DataFrame]]]:

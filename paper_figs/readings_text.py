@@ -164,13 +164,13 @@ def _together(published: Path, verdicts: pd.DataFrame) -> str:
     for claim in TOGETHER:
         holds = verdicts.query("claim == @claim and reading > 0").set_index("reading").holds.astype(bool)
         here = pd.Series(both[holds.index.to_numpy(int)], holds.index)
-        everywhere, with_one = (
-            f"{share_of(holds.loc[of & here])}, in all others in {share_of(holds.loc[of & ~here])}"
-            for of in (here | True, holds.index.isin(worthwhile.index))
+        with_one = holds.index.isin(worthwhile.index)
+        everywhere, worth_it = (
+            [percent(holds.loc[of & which].mean()) for which in (here, ~here)] for of in (here | True, with_one)
         )
-        parts.append(f"{claim} holds in {everywhere} (with a trade-off: {with_one})")
+        parts.append(f"{claim} holds in {' and '.join(everywhere)} (with a trade-off: {' and '.join(worth_it)})")
     return (
-        "With the Huber loss in the target and Table I's source together, "
+        "With the Huber loss in the target and Table I's source together, and in all others, "
         + "; ".join(parts)
         + " ([why](docs/explanation/readings.md#why-a-loss-that-does-not-see-rare-costs))."
     )
