@@ -81,8 +81,8 @@ def learner(name: str, agents: int, steps: int, devices: int | None = None, **se
         if name == "ddqn":
             ring = packing.pack(one_step, uniform.layout_of(states, actions))
             return new._replace(learner=new.learner._replace(ring=ring))
-        items = n_step.NStepTransition(*one_step, one_step.reward, jnp.full(size, 0.9), one_step.next_state)
-        replay = prioritised.init(items, prioritised.layout_of(states, actions, size, size))
+        items = n_step.NStepTransition(*one_step, one_step.reward, discount, one_step.next_state)
+        replay = prioritised.init(items, prioritised.layout_of(states, actions, size, size, config.n_step))
         return new._replace(learner=new.learner._replace(replay=replay))
 
     start = parallel.over_agents(agent)

@@ -37,7 +37,7 @@ def run(quick: bool) -> list[Result]:
 
         def one(_, key):
             def step(tree, words):
-                indices, values = sum_tree.sample(tree, words, layout)
+                indices, values, _ = sum_tree.sample(tree, words, layout)
                 return sum_tree.update(tree, indices, values * (0.5 + rng.uniform(words[0])), layout), None
 
             words = jax.random.bits(key, (steps, sum_tree.NUM_WORDS, BATCH), jnp.uint32)

@@ -149,7 +149,7 @@ class TLwD(NamedTuple):
         window = n_step.push(state.window, transition, step % self.spec.episode_slots)
         complete = step + 1 - self.config.n_step
         oldest = jax.tree.map(lambda field: field[0], window)
-        replay = prioritised.add(state.replay, oldest, complete, self.layout)
+        replay = prioritised.add(state.replay, oldest, complete, self.layout, hparams.discount)
         target = self.function.next_target(state.target, state.weights, step, hparams)
         state = state._replace(replay=replay, window=window, target=target)
         words = words.reshape(prioritised.NUM_WORDS, self.config.batch_size)
@@ -203,7 +203,7 @@ def tlwd(spec: Spec, config: Config) -> Learner:
     function = q_function(spec, config)
     check_optimiser(config, function)
     states_and_actions = states.num_states(spec.shape), spec.num_actions
-    layout = prioritised.layout_of(*states_and_actions, config.replay_capacity, config.demonstrations)
+    layout = prioritised.layout_of(*states_and_actions, config.replay_capacity, config.demonstrations, config.n_step)
     rule = TLwD(spec, config, function, optimiser_of(config), layout)
     return Learner(
         num_words=exploration.NUM_WORDS + prioritised.NUM_WORDS * config.batch_size,

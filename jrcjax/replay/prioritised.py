@@ -1,6 +1,11 @@
 """Prioritised replay with protected demonstrations: the paper's equations (23) and (24).
 
-Demonstrations lie first and are never overwritten; behind them a ring takes what the agent sees itself.
+Demonstrations lie first and are never overwritten; behind them a ring takes what the agent sees itself. Priorities lie
+beside their transitions, four of each in a line, and a sum tree over the sums of lines leads to the line:
+
+    line    p^alpha of four | the four transitions, as packed words
+
+In the paper's problem a line is one cache line of 64 bytes, so that looking for a transition fetches it, too.
 """
 
 from __future__ import annotations
@@ -12,7 +17,7 @@ import jax.numpy as jnp
 
 from jrcjax.replay import packing, sum_tree
 from jrcjax.replay.n_step import NStepTransition
-from jrcjax.replay.packing import NUMBER, SWITCH
+from jrcjax.replay.packing import NUMBER, SWITCH, Power
 from jrcjax.types import Bool, Float, Int, Words
 
 NUM_WORDS = sum_tree.NUM_WORDS
@@ -23,17 +28,29 @@ class Layout(NamedTuple):
     """How transitions and priorities lie in memory."""
 
     rows: packing.Layout
+    """Of one transition."""
     tree: sum_tree.Layout
+    """Over the sums of lines, with as many children as a line has transitions."""
+    capacity: int
     demonstrations: int
+
+    @property
+    def per_line(self) -> int:
+        """Transitions of a line, and words of their priorities, which come first."""
+        return self.tree.children
+
+    def word(self, index: Int) -> Int:
+        """Where in its line transition number `index` begins."""
+        return self.per_line + self.tree.column(index) * self.rows.words
 
 
 class Replay(NamedTuple):
     """Transitions and their priorities."""
 
-    rows: Words
-    """[capacity, words]."""
+    lines: Words
+    """[lines, words]; a priority is zero where nothing is stored yet."""
     tree: Float
-    """Sum tree over p^alpha; zero where nothing is stored yet."""
+    """Sum tree over the sums of lines."""
     largest: Float
     """Largest p^alpha so far, which a new transition gets, so that it is soon sampled once."""
 
@@ -51,40 +68,54 @@ class Sample(NamedTuple):
     """[B]."""
 
 
-def layout_of(num_states: int, num_actions: int, capacity: int, demonstrations: int) -> Layout:
-    """The layout for `capacity` transitions, the first of them demonstrations."""
-    fields = (num_states, num_actions, NUMBER, num_states, SWITCH, NUMBER, NUMBER, num_states)
-    return Layout(packing.layout_of(NStepTransition, fields), sum_tree.layout_of(capacity), demonstrations)
+def layout_of(num_states: int, num_actions: int, capacity: int, demonstrations: int, n: int) -> Layout:
+    """The layout for `capacity` transitions with returns of up to n steps, the first of them demonstrations."""
+    fields = (num_states, num_actions, NUMBER, num_states, SWITCH, NUMBER, Power(n), num_states)
+    per_line = 4
+    lines = -(-capacity // per_line)
+    return Layout(
+        packing.layout_of(NStepTransition, fields), sum_tree.layout_of(lines, per_line), capacity, demonstrations
+    )
 
 
 def init(demonstrations: NStepTransition, layout: Layout) -> Replay:
-    """Demonstrations alone, all with priority 1."""
-    free = layout.tree.leaves - layout.demonstrations
-    rows = jnp.pad(packing.pack(demonstrations, layout.rows), ((0, free), (0, 0)))
-    priorities = (jnp.arange(layout.tree.leaves) < layout.demonstrations).astype(jnp.float32)
-    return Replay(rows, sum_tree.init(priorities, layout.tree), jnp.float32(1.0))
+    """Demonstrations alone, all with priority 1. Their gamma may be another: the steps of their returns are kept."""
+    room = layout.tree.leaves * layout.per_line
+    rows = packing.pack(demonstrations, layout.rows, demonstrations.discount.max())
+    rows = jnp.pad(rows, ((0, room - layout.demonstrations), (0, 0)))
+    priorities = (jnp.arange(room) < layout.demonstrations).astype(jnp.float32).reshape(-1, layout.per_line)
+    lines = jnp.concatenate([_as_words(priorities), rows.reshape(layout.tree.leaves, -1)], axis=1)
+    return Replay(lines, sum_tree.init(sum_tree.sum_of(priorities), layout.tree), jnp.float32(1.0))
+
+
+def contents(replay: Replay, layout: Layout, discount: Float | float) -> tuple[Float, NStepTransition]:
+    """All priorities p^alpha and all transitions, [capacity] each, as `sample` finds them."""
+    priorities = _as_numbers(replay.lines[:, : layout.per_line]).reshape(-1)
+    rows = replay.lines[:, layout.per_line :].reshape(-1, layout.rows.words)
+    transitions = packing.unpack(rows[: layout.capacity], layout.rows, discount)
+    return priorities[: layout.capacity], transitions
 
 
 def size(count: Int, layout: Layout) -> Int:
     """|D_re|, transitions held after `count` new ones were added."""
-    return layout.demonstrations + jnp.minimum(count, layout.tree.leaves - layout.demonstrations)
+    return layout.demonstrations + jnp.minimum(count, layout.capacity - layout.demonstrations)
 
 
-def add(replay: Replay, transition: NStepTransition, count: Int, layout: Layout) -> Replay:
+def add(replay: Replay, transition: NStepTransition, count: Int, layout: Layout, discount: Float) -> Replay:
     """Writes new transition number `count` (from 0) over the oldest new one.
 
     If `count` < 0 there is no new transition yet, and nothing is stored.
 
-    With a `count` that is the same for all agents under vmap the rows are written in place.
+    With a `count` that is the same for all agents under vmap the lines are written in place.
     """
-    ring = layout.tree.leaves - layout.demonstrations
-    position = layout.demonstrations + jnp.maximum(count, 0) % ring
-    row = packing.pack(transition, layout.rows)[None]
-    priority = jnp.where(count < 0, 0.0, replay.largest)
-    return replay._replace(
-        rows=jax.lax.dynamic_update_slice(replay.rows, row, (position, 0)),
-        tree=sum_tree.update_one(replay.tree, position, priority, layout.tree),
-    )
+    position = layout.demonstrations + jnp.maximum(count, 0) % (layout.capacity - layout.demonstrations)
+    line, priority = layout.tree.parent(position), jnp.where(count < 0, 0.0, replay.largest)
+    row = packing.pack(transition, layout.rows, discount)
+    lines = jax.lax.dynamic_update_slice(replay.lines, row[None], (line, layout.word(position)))
+    lines = jax.lax.dynamic_update_slice(lines, _as_words(priority)[None, None], (line, layout.tree.column(position)))
+    (priorities,) = _as_numbers(jax.lax.dynamic_slice(lines, (line, 0), (1, layout.per_line)))
+    tree = sum_tree.update_one(replay.tree, line, sum_tree.sum_of(priorities), layout.tree)
+    return replay._replace(lines=lines, tree=tree)
 
 
 def sample(replay: Replay, words: Words, layout: Layout, discount: Float) -> Sample:
@@ -98,10 +129,28 @@ def sample(replay: Replay, words: Words, layout: Layout, discount: Float) -> Sam
     """
     # The values come with the indices: reading them from the tree again would not be ordered before its update, and XLA
     # would copy the whole tree in every step.
-    indices, values = sum_tree.sample(replay.tree, words, layout.tree)
-    rows = replay.rows.at[indices].get(mode="promise_in_bounds")
-    probability = values / sum_tree.total(replay.tree, layout.tree)
-    return Sample(packing.unpack(rows, layout.rows, discount), indices, probability, indices < layout.demonstrations)
+    line, _, rest = sum_tree.sample(replay.tree, words, layout.tree)
+    place, value, _ = sum_tree.child_at(_as_numbers(_slices(replay.lines, line, 0, layout.per_line)), rest)
+    indices = line * layout.per_line + place
+    rows = _slices(replay.lines, line, layout.word(place), layout.rows.words)
+    probability = value / sum_tree.total(replay.tree, layout.tree)
+    transitions = packing.unpack(rows, layout.rows, discount)
+    return Sample(transitions, indices, probability, indices < layout.demonstrations)
+
+
+def _slices(lines: Words, line: Int, begin: Int | int, number: int) -> Words:
+    """So many words of each of some lines [B], from `begin` on, [B, number]."""
+    starts = jnp.stack(jnp.broadcast_arrays(line, jnp.asarray(begin, line.dtype)), axis=-1)
+    numbers = jax.lax.GatherDimensionNumbers(offset_dims=(1,), collapsed_slice_dims=(0,), start_index_map=(0, 1))
+    return jax.lax.gather(lines, starts, numbers, (1, number), mode=jax.lax.GatherScatterMode.PROMISE_IN_BOUNDS)
+
+
+def _as_words(priorities: Float) -> Words:
+    return jax.lax.bitcast_convert_type(priorities, jnp.uint32)
+
+
+def _as_numbers(words: Words) -> Float:
+    return jax.lax.bitcast_convert_type(words, jnp.float32)
 
 
 def priority(td_error: Float, is_demonstration: Bool, constant: Float, of_demonstrations: Float) -> Float:
@@ -113,7 +162,12 @@ def set_priorities(replay: Replay, indices: Int, priorities: Float, exponent: Fl
     """Stores p_i^alpha for priorities p_i > 0, [B] each; what is sampled twice has equal ones."""
     scaled = jnp.exp(exponent * jnp.log(priorities))  # the power function of XLA on a CPU is not vectorised
     largest = jnp.maximum(replay.largest, scaled.max())
-    return replay._replace(tree=sum_tree.update(replay.tree, indices, scaled, layout.tree), largest=largest)
+    line = layout.tree.parent(indices)
+    # By one number each, since XLA writes line and place of every one to memory before it goes there.
+    flat = replay.lines.reshape(-1).at[line * replay.lines.shape[1] + layout.tree.column(indices)]
+    lines = flat.set(_as_words(scaled), mode="promise_in_bounds").reshape(replay.lines.shape)
+    sums = sum_tree.sum_of(_as_numbers(_slices(lines, line, 0, layout.per_line)))
+    return Replay(lines, sum_tree.update(replay.tree, line, sums, layout.tree), largest)
 
 
 def importance_weights(probability: Float, size: Int, exponent: Float) -> Float:

@@ -84,7 +84,7 @@ def _as_rows(values: Float, layout: Layout) -> Float:
 
 def _above(rows: Float, layout: Layout) -> Float:
     """The level above one with these rows."""
-    return _as_rows(_sum(rows), layout)
+    return _as_rows(sum_of(rows), layout)
 
 
 def leaves(tree: Float, indices: Int, layout: Layout) -> Float:
@@ -106,7 +106,7 @@ def _upper(tree: Float, layout: Layout) -> list[Float]:
     return levels
 
 
-def _sum(rows: Float) -> Float:
+def sum_of(rows: Float) -> Float:
     """Sums of rows [..., children], written out so that XLA joins them with the look-up of the rows."""
     return functools.reduce(operator.add, (rows[..., k] for k in range(rows.shape[-1])))
 
@@ -121,7 +121,7 @@ def update(tree: Float, indices: Int, values: Float, layout: Layout) -> Float:
     for first_row in lower:
         tree = _with(tree, first_row, indices, values)
         indices = layout.parent(indices)
-        values = _sum(tree.at[first_row + indices].get(mode="promise_in_bounds"))
+        values = sum_of(tree.at[first_row + indices].get(mode="promise_in_bounds"))
     return _with(tree, top, indices, values)
 
 
@@ -145,11 +145,11 @@ def update_one(tree: Float, index: Int, value: Float, layout: Layout) -> Float:
     rows = []
     for row, i in zip(tree.at[path].get(mode="promise_in_bounds"), indices, strict=True):
         rows.append(jnp.where(jnp.arange(layout.children) == layout.column(i), value, row))
-        value = _sum(rows[-1])
+        value = sum_of(rows[-1])
     return tree.at[path].set(jnp.stack(rows), mode="promise_in_bounds")
 
 
-def sample(tree: Float, words: Words, layout: Layout) -> tuple[Int, Float]:
+def sample(tree: Float, words: Words, layout: Layout) -> tuple[Int, Float, Float]:
     """Draws leaves in proportion to their values, with replacement.
 
     Args:
@@ -158,7 +158,7 @@ def sample(tree: Float, words: Words, layout: Layout) -> tuple[Int, Float]:
       layout: the tree's layout.
 
     Returns:
-      Indices of the leaves and their values, [B] each.
+      Indices of the leaves, their values, and how far into them the draws lie, [B] each.
     """
     *upper, top = _upper(tree, layout)
     node = _node_at(top, rng.uniform(words[0]))
@@ -167,9 +167,9 @@ def sample(tree: Float, words: Words, layout: Layout) -> tuple[Int, Float]:
     rest = rng.uniform(words[1]) * value
     levels = [(level, 0) for level in upper[::-1]] + [(tree, first_row) for first_row in layout.first_row[-2::-1]]
     for rows, first_row in levels:
-        child, value, rest = _child_at(rows.at[first_row + node].get(mode="promise_in_bounds"), rest)
+        child, value, rest = child_at(rows.at[first_row + node].get(mode="promise_in_bounds"), rest)
         node = node * layout.children + child
-    return node, value
+    return node, value, rest
 
 
 def _node_at(rows: Float, share: Float) -> Int:
@@ -186,7 +186,7 @@ def _node_at(rows: Float, share: Float) -> Int:
     return jnp.minimum(passed.sum(axis=1), positive - 1)  # rounding must not lead past the last positive one
 
 
-def _child_at(children: Float, rest: Float) -> tuple[Int, Float, Float]:
+def child_at(children: Float, rest: Float) -> tuple[Int, Float, Float]:
     """Which of children [B, N] lies at `rest` [B] of their running sum; its value; how far into it."""
     # In one array of three rows, one for each result, which XLA computes in one loop; of three arrays it makes seven.
     shape = (3, *rest.shape)

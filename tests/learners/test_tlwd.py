@@ -17,7 +17,7 @@ from jrcjax.learners.hparams import Config, HParams
 from jrcjax.learners.q_function import QFunction, q_function
 from jrcjax.learners.tlwd import combined_loss, losses, tlwd
 from jrcjax.policies import greedy_policy
-from jrcjax.replay import packing, prioritised, sum_tree
+from jrcjax.replay import prioritised, sum_tree
 from jrcjax.replay.n_step import NStepTransition
 from jrcjax.replay.prioritised import Sample
 from jrcjax.replay.uniform import Transition
@@ -131,14 +131,9 @@ class Problem:
         return loss_and_gradient(theta, theta_target, self.batch, self.is_demonstration, self.importance, self.hparams)
 
 
-def with_discount(transitions, gamma: float):
-    """Discounts of gamma, or 0 where they are 0."""
-    return transitions._replace(discount=np.where(transitions.discount == 0, 0.0, float(np.float32(gamma))))
-
-
 def problem(form="table", hidden=(24, 24), size=64, seed=1, demonstrations=0.5, **numbers) -> Problem:
     config, generator = Config(hidden=hidden, form=form), np.random.default_rng([seed, 7])
-    batch = with_discount(random_demonstrations(SPEC, size, seed, scale=3.0), numbers.get("discount", 0.99))
+    batch = random_demonstrations(SPEC, size, seed, scale=3.0, gamma=numbers.get("discount", 0.99))
     return Problem(
         q_function(SPEC, config),
         *(random_weights(SPEC, config, 10 * seed + i) for i in (1, 2)),
@@ -321,11 +316,12 @@ class Algorithm2(Descent):
 
 
 def assert_same_memory(memory, twin: Algorithm2):
-    layout = prioritised.layout_of(STATES, SPEC.num_actions, twin.config.replay_capacity, twin.config.demonstrations)
-    held = packing.unpack(memory.rows[: len(twin.memory)], layout.rows, twin.hparams.discount)
+    config = twin.config
+    sizes = config.replay_capacity, config.demonstrations, config.n_step
+    layout = prioritised.layout_of(STATES, SPEC.num_actions, *sizes)
+    priorities, held = jax.device_get(prioritised.contents(memory, layout, twin.hparams.discount))
     for got, wanted in zip(held, zip(*twin.memory, strict=True), strict=True):
-        np.testing.assert_allclose(got, wanted, rtol=1e-5, atol=1e-5)
-    priorities = np.asarray(sum_tree.leaves(memory.tree, jnp.arange(twin.config.replay_capacity), layout.tree))
+        np.testing.assert_allclose(got[: len(twin.memory)], wanted, rtol=1e-5, atol=1e-5)
     np.testing.assert_allclose(priorities[: len(twin.memory)], twin.priorities, rtol=1e-4)
     np.testing.assert_array_equal(priorities[len(twin.memory) :], 0)
     np.testing.assert_allclose(memory.largest, twin.largest, rtol=1e-4)
@@ -357,7 +353,9 @@ def test_updates_against_algorithm_2(case):
     config = Config(**small | {"n_step": 4, "hidden": (8,)} | settings)
     hparams = hparams_of(**{"target_period": 7, "learning_rate": 5e-3, "l2_weight": 1e-3} | numbers)
     learner, function = tlwd(SPEC, config), q_function(SPEC, config)
-    demonstrations = with_discount(random_demonstrations(SPEC, config.demonstrations, 4), hparams.discount)
+    demonstrations = random_demonstrations(
+        SPEC, config.demonstrations, 4, gamma=float(hparams.discount), n=config.n_step
+    )
     source = Source(random_weights(SPEC, config, 5), on_device(demonstrations))
     # Not a key whose network has all hidden units off in some state: Adam's first step is by the rate up or down, the
     # values there are then equal for several actions, and rounding alone decides which of them is the largest.

@@ -8,19 +8,20 @@ from hypothesis import strategies as st
 
 from jrcjax.replay import packing, prioritised, uniform
 from jrcjax.replay.n_step import NStepTransition
-from jrcjax.replay.packing import NUMBER, SWITCH
+from jrcjax.replay.packing import NUMBER, SWITCH, Power
 
 GAMMA = 0.75
 PAPER = (2**5, 4)  # states and actions of the paper's problem
-NUMBERS = {"reward", "n_return", "n_discount"}
-FLOATS = NUMBERS | {"discount"}
+NUMBERS = {"reward", "n_return"}
+FLOATS = NUMBERS | {"discount", "n_discount"}
+N = 10
 SIZES = [1, 2, 3, 32, 1000, 2**15, 10**6, 2**31 - 1]
 LAYOUTS = {
     "uniform": uniform.layout_of,
-    "prioritised": lambda states, actions: prioritised.layout_of(states, actions, 4, 2).rows,
+    "prioritised": lambda states, actions: prioritised.layout_of(states, actions, 4, 2, N).rows,
 }
 # A few fields of any sort in any order; layouts know no more of a NamedTuple than that.
-NO_IDS = st.sampled_from([NUMBER, SWITCH])
+NO_IDS = st.sampled_from([NUMBER, SWITCH, Power(1), Power(20)])
 ANY_SIZES = st.lists(st.one_of(NO_IDS, st.sampled_from(SIZES), st.integers(1, 2**31 - 1)), min_size=1, max_size=8)
 
 
@@ -36,7 +37,8 @@ def assert_fields_lie_apart(layout: packing.Layout, sizes) -> None:
         if size == NUMBER:
             assert (place.shift, place.bits) == (0, 32)
         else:
-            assert (1 if size == SWITCH else size - 1) < 2**place.bits
+            ids = 2 if size == SWITCH else size.ids if isinstance(size, Power) else size
+            assert ids - 1 < 2**place.bits
         mask = (2**place.bits - 1) << place.shift
         assert mask < 2**32
         assert not taken[place.word] & mask
@@ -57,14 +59,14 @@ def test_transitions_take_as_few_words_as_the_ids_fit(states, actions, words):
 
 @pytest.mark.parametrize(
     ("states", "actions", "words"),
-    [(*PAPER, 4), (1, 1, 4), (2**9, 8, 4), (2**10, 4, 5), (2**14, 4, 5), (2**31 - 1, 4, 7)],
+    [(*PAPER, 3), (1, 1, 3), (2**7, 8, 3), (2**9, 8, 4), (2**14, 4, 4), (2**31 - 1, 4, 7)],
 )
 def test_n_step_transitions_take_as_few_words_as_the_ids_fit(states, actions, words):
-    layout = prioritised.layout_of(states, actions, 4, 2).rows
+    layout = prioritised.layout_of(states, actions, 4, 2, N).rows
     assert layout.kind is NStepTransition
     assert [place.bits == 32 for place in layout.places] == [name in NUMBERS for name in NStepTransition._fields]
     assert layout.words == words
-    assert_fields_lie_apart(layout, (states, actions, NUMBER, states, SWITCH, NUMBER, NUMBER, states))
+    assert_fields_lie_apart(layout, (states, actions, NUMBER, states, SWITCH, NUMBER, Power(N), states))
 
 
 @settings(max_examples=150, deadline=None, derandomize=True)
@@ -79,6 +81,7 @@ def some_ids(size: int):
 
 def some_fields(data, kind, states: int, actions: int):
     ids = {"action": some_ids(actions), "discount": st.sampled_from([0.0, GAMMA])}
+    ids["n_discount"] = st.sampled_from([0.0, *(GAMMA**k for k in range(N + 1))])
     numbers = st.floats(width=32, allow_nan=False)
     return kind(*(data.draw(numbers if f in NUMBERS else ids.get(f, some_ids(states))) for f in kind._fields))
 
@@ -89,7 +92,7 @@ def some_fields(data, kind, states: int, actions: int):
 def test_pack_and_unpack_are_inverse(name, data, states, actions):
     layout = LAYOUTS[name](states, actions)
     value = some_fields(data, layout.kind, states, actions)
-    row = packing.pack(value, layout)
+    row = packing.pack(value, layout, GAMMA)
     assert row.shape == (layout.words,)
     assert row.dtype == jnp.uint32
     back = packing.unpack(row, layout, GAMMA)
@@ -107,7 +110,7 @@ def test_rows_of_many(name, shape):
     number = lambda: rng.normal(size=shape).astype(np.float32)  # noqa: E731
     value = layout.kind(*(number() if f in NUMBERS else rng.integers(0, 2, shape) for f in layout.kind._fields))
     value = value._replace(discount=value.discount * np.float32(GAMMA))
-    rows = packing.pack(value, layout)
+    rows = packing.pack(value, layout, GAMMA)
     assert rows.shape == (*shape, layout.words)
     for got, wanted in zip(packing.unpack(rows, layout, GAMMA), value, strict=True):
         np.testing.assert_array_equal(got, wanted)
@@ -119,3 +122,19 @@ def test_numbers_keep_their_bits(bits):
     number = np.uint32(bits).view(np.float32)  # subnormal, infinite, NaN with a payload, -0
     back = packing.unpack(packing.pack(uniform.Transition(31, 3, number, 31, 1), layout), layout)
     assert np.asarray(back.reward).view(np.uint32) == bits
+
+
+@pytest.mark.parametrize("gamma", [0.0, 0.3, 0.9, 0.99, 0.999])
+@pytest.mark.parametrize("most", [1, 10, 20])
+def test_powers_are_those_that_returns_multiply(gamma, most):
+    layout = packing.layout_of(fields_of, (Power(most),))
+    powers = [np.float32(1.0)]
+    for _ in range(most):
+        powers.append(powers[-1] * np.float32(gamma))
+    for number in (*powers, np.float32(0.0)):
+        (back,) = packing.unpack(packing.pack((number,), layout, np.float32(gamma)), layout, np.float32(gamma))
+        assert back == number
+    # How many steps a return has is kept, whatever their discount was.
+    for steps in range(1, most + 1) if gamma else ():
+        (back,) = packing.unpack(packing.pack((powers[steps],), layout, np.float32(gamma)), layout, np.float32(0.5))
+        assert back == 0.5**steps

@@ -12,17 +12,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from significance import ALPHA, chi_square, same_law
 
-from jrcjax.replay import packing, sum_tree
 from jrcjax.replay import prioritised as replay_of
+from jrcjax.replay import sum_tree
 from jrcjax.replay.n_step import NStepTransition
 
 STATES, ACTIONS = 32, 4
-GAMMA = 0.75
+GAMMA, N = 0.75, 10
 # A power, a logarithm and a sum of some hundred numbers >= 0, in float32.
 RTOL = 3e-6
 
 INIT = jax.jit(replay_of.init, static_argnums=1)
-ADD = jax.jit(replay_of.add, static_argnums=3)
+ADD = jax.jit(partial(replay_of.add, discount=jnp.float32(GAMMA)), static_argnums=3)
 SAMPLE = jax.jit(partial(replay_of.sample, discount=jnp.float32(GAMMA)), static_argnums=2)
 SET = jax.jit(replay_of.set_priorities, static_argnums=4)
 WEIGHTS = jax.jit(replay_of.importance_weights)
@@ -31,14 +31,15 @@ WEIGHTS = jax.jit(replay_of.importance_weights)
 def numbered(i, xp=np) -> NStepTransition:
     """Transitions that tell their number by their reward, which is never 0 as in a row that was not written."""
     ids, number = (xp.asarray(i) * 7919 % 2**20).astype(xp.int32), xp.asarray(i).astype(xp.float32)
+    goes_on = (ids % 2).astype(xp.float32)
     return NStepTransition(
         ids % STATES,
         ids % ACTIONS,
         number + 1,
         ids // 3 % STATES,
-        (ids % 2).astype(xp.float32) * xp.float32(GAMMA),
+        goes_on * xp.float32(GAMMA),
         -number,
-        number / 8,
+        goes_on * xp.float32(GAMMA) ** (1 + ids // 2 % N),
         ids // 5 % STATES,
     )
 
@@ -58,8 +59,7 @@ def words_of(key: int, count: int) -> jax.Array:
 @partial(jax.jit, static_argnums=1)
 def everything(replay: replay_of.Replay, layout: replay_of.Layout):
     """All leaves and all rows as transitions."""
-    values = sum_tree.leaves(replay.tree, jnp.arange(layout.tree.leaves), layout.tree)
-    return values, packing.unpack(replay.rows, layout.rows, GAMMA)
+    return replay_of.contents(replay, layout, jnp.float32(GAMMA))
 
 
 def held(replay: replay_of.Replay, layout: replay_of.Layout) -> dict[int, float]:
@@ -113,7 +113,7 @@ def assert_same(replay, layout, naive: Naive, count: int) -> None:
 )
 def test_replay_against_a_list_and_a_queue(sizes, alpha, late, operations):
     demonstrations, capacity = sizes
-    layout, naive = replay_of.layout_of(STATES, ACTIONS, capacity, demonstrations), Naive(demonstrations, capacity)
+    layout, naive = replay_of.layout_of(STATES, ACTIONS, capacity, demonstrations, N), Naive(demonstrations, capacity)
     replay = INIT(numbered(np.arange(demonstrations)), layout)
     assert_same(replay, layout, naive, 0)
     added = 0
@@ -140,7 +140,7 @@ def test_replay_against_a_list_and_a_queue(sizes, alpha, late, operations):
 @partial(jax.jit, static_argnums=1)
 def add_all(replay, layout, counts):
     def one(replay, count):
-        return replay_of.add(replay, numbered(layout.demonstrations + count, jnp), count, layout), None
+        return replay_of.add(replay, numbered(layout.demonstrations + count, jnp), count, layout, GAMMA), None
 
     return jax.lax.scan(one, replay, counts)[0]
 
@@ -148,7 +148,7 @@ def add_all(replay, layout, counts):
 @pytest.mark.parametrize("added", [12_345, 30_000, 75_000])
 def test_the_papers_replay_keeps_the_demonstrations_and_the_newest_of_the_rest(added):
     demonstrations, capacity, late = 20_000, 50_000, 9
-    layout = replay_of.layout_of(STATES, ACTIONS, capacity, demonstrations)
+    layout = replay_of.layout_of(STATES, ACTIONS, capacity, demonstrations, N)
     counts = jnp.arange(-late, 75_000)
     # One length for all, so that one compiled program serves; the last ones are repeated.
     replay = add_all(INIT(numbered(np.arange(demonstrations)), layout), layout, jnp.minimum(counts, added - 1))
@@ -161,7 +161,7 @@ def test_the_papers_replay_keeps_the_demonstrations_and_the_newest_of_the_rest(a
 
 
 def test_before_the_first_new_transition_only_demonstrations_are_sampled():
-    layout = replay_of.layout_of(STATES, ACTIONS, 40, 16)  # the next leaf begins a node
+    layout = replay_of.layout_of(STATES, ACTIONS, 40, 16, N)  # the next leaf begins a node
     replay = INIT(numbered(np.arange(16)), layout)
     for count in range(-5, 0):
         replay = ADD(replay, numbered(10**6), jnp.int32(count), layout)
@@ -175,7 +175,7 @@ def test_before_the_first_new_transition_only_demonstrations_are_sampled():
 
 
 def test_new_transitions_get_the_largest_priority_so_far_even_after_it_is_gone():
-    layout = replay_of.layout_of(STATES, ACTIONS, 6, 3)
+    layout = replay_of.layout_of(STATES, ACTIONS, 6, 3, N)
     replay = INIT(numbered(np.arange(3)), layout)
     replay = SET(replay, jnp.asarray([1, 2]), jnp.asarray([16.0, 0.25]), jnp.float32(0.5), layout)
     replay = SET(replay, jnp.asarray([1]), jnp.asarray([4.0]), jnp.float32(0.5), layout)
@@ -185,7 +185,7 @@ def test_new_transitions_get_the_largest_priority_so_far_even_after_it_is_gone()
 
 def filled(priorities: np.ndarray, alpha: float, capacity: int, demonstrations: int):
     """A replay that holds transition i with priority i, and its layout."""
-    layout = replay_of.layout_of(STATES, ACTIONS, capacity, demonstrations)
+    layout = replay_of.layout_of(STATES, ACTIONS, capacity, demonstrations, N)
     replay = INIT(numbered(np.arange(demonstrations)), layout)
     for i in range(demonstrations, len(priorities)):
         replay = ADD(replay, numbered(i), jnp.int32(i - demonstrations), layout)

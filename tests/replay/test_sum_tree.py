@@ -22,7 +22,7 @@ LARGEST_WORD = 2**32 - 1
 INIT = jax.jit(sum_tree.init, static_argnums=1)
 UPDATE = jax.jit(sum_tree.update, static_argnums=3)
 UPDATE_ONE = jax.jit(sum_tree.update_one, static_argnums=3)
-SAMPLE = jax.jit(sum_tree.sample, static_argnums=2)
+SAMPLE = jax.jit(lambda *args: sum_tree.sample(*args)[:2], static_argnums=2)
 
 
 def f32(values) -> jax.Array:
