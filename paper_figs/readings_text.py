@@ -228,10 +228,11 @@ def questions_table(published: Path) -> str:
     sensitivity, default = csv_of(published, MULTIVERSE.name, "sensitivity"), values_at(default_unit())
     rows = []
     for reading in READINGS:
-        of_question = sensitivity.query("input == @reading.label and surrogate_error < @_BLIND").nlargest(1, "total")
+        of_question = sensitivity.query("input == @reading.label and surrogate_error < @_BLIND")
+        predicted = (of_question.total * (1.0 - of_question.surrogate_error)).nlargest(1).index
         decides = "".join(
             f"{most['claim']}: {most['total']:.2f} ({most['total_low']:.2f} to {most['total_high']:.2f})"
-            for _, most in of_question.iterrows()
+            for _, most in of_question.loc[predicted].iterrows()
         )
         value = as_text(reading.path, default[reading.path])
         of_default = value if isinstance(value, str) else f"{value:g}"
