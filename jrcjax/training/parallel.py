@@ -63,6 +63,10 @@ def use_all_cores() -> None:
     any other number of cores. Call it before any array is made; on an accelerator it changes nothing but numerics.
     Flags that XLA_FLAGS has already are left, and so are those that this jaxlib does not know, which would end the
     process.
+
+    XLA of jaxlib 0.10 ends the process when it compiles some programs that are not this package's, such as a DQN of
+    flax and optax, with `xla_cpu_use_multi_output_fusion`, one of these flags. Beside such programs set
+    XLA_FLAGS=--xla_backend_extra_options=-unroll-full-max-count=8 before, which leaves it out.
     """
     numerics.pin()
     set_flags()
