@@ -1,10 +1,12 @@
 """Sensitivity indices on functions whose indices are known."""
 
+import joblib
 import numpy as np
 import pandas as pd
 import pytest
 
 from paper_figs.analysis.sensitivity import sensitivity
+from paper_figs.studies import multiverse
 from sweeps.design import sobol
 
 
@@ -52,3 +54,35 @@ def test_what_never_changes_is_decided_by_nothing_and_few_points_by_no_one():
     assert (sensitivity(inputs, np.ones(64)).table["total"] == 0).all()
     with pytest.raises(ValueError, match="points: 8; allowed: at least 30"):
         sensitivity(inputs[:8], np.arange(8.0))
+
+
+def of_claim(claim, values):
+    """Verdicts of one claim in as many readings of the multiverse as there are values."""
+    return pd.DataFrame({"reading": np.arange(len(values)), "claim": claim, "value": values})
+
+
+def test_what_decides_in_a_multiverse_with_known_answers():
+    places = multiverse.places(257)
+    rng, step, weight = np.random.default_rng(0), "step size (SGD: a hundredth)", "weight of the margin"
+    values = 3 * places[step] + 2 * places[weight] + rng.normal(0, 0.2, len(places))
+    values[rng.random(len(places)) < 0.2] = np.nan  # nobody converges
+    with joblib.parallel_config(backend="sequential"):
+        table = multiverse.decisive(of_claim("C5 (highest)", values), 450)["sensitivity"].set_index("input")
+    assert (table.readings == np.isfinite(values[1:]).sum()).all()
+    for question, share in ((step, 9 / 13), (weight, 4 / 13)):
+        for order in ("first", "total"):
+            assert table[f"{order}_low"][question] <= share <= table[f"{order}_high"][question]
+    others = table.drop([step, weight])
+    assert others.total_low.max() < 0.05
+    assert len(others) == 23  # of 29 questions two are Q-learning's, and two count what is not rewarded
+
+
+def test_runs_that_never_converge_have_a_part_in_what_decides():
+    places = multiverse.places(129)
+    values = np.where(places["loss"] == 0, np.inf, 100.0)
+    with joblib.parallel_config(backend="sequential"):
+        table = multiverse.decisive(of_claim("C7 (DDQN)", values), 450)["sensitivity"].set_index("input")
+    assert (table.readings == 128).all()
+    assert table.total["loss"] > 0.9
+    assert table.drop("loss").total.max() < 0.1
+    assert "weight of the margin" not in table.index
