@@ -65,6 +65,9 @@ class Run:
     keep: bool = False
     """Of the multiverse, keep what the summary in OUT/multiverse/summary, which an earlier run wrote, says of other
     readings."""
+    undecided: Annotated[str | None, tyro.conf.arg(metavar="CLAIM")] = None
+    """Of the multiverse, with --keep: only readings that the summary has no verdict of this claim for, such as
+    "C5 (highest)", and fewer seeds than --seeds."""
     confirm: Count = None
     """Of the reconstruction, how many fresh seeds confirm what it found. Default: 100, or 1 with --smoke."""
     custom: tyro.conf.OmitArgPrefixes[Options] = field(default_factory=Options)
@@ -154,7 +157,7 @@ def _study(command: Run, preset: str) -> Study:
 
     of_readings = (multiverse.MULTIVERSE.name, reconstruction.NAME)
     limited = {"readings": of_readings, "confirm": of_readings[1:]} | dict.fromkeys(
-        ("first", "per_block", "keep"), of_readings[:1]
+        ("first", "per_block", "keep", "undecided"), of_readings[:1]
     )
     for option, names in limited.items():
         if getattr(command, option) != getattr(Run, option) and command.name not in names:
@@ -166,8 +169,25 @@ def _study(command: Run, preset: str) -> Study:
     if given:
         refuse("name", command.name, f"{CUSTOM}, for which alone --{given[0].replace('_', '-')} is")
     if command.name == multiverse.MULTIVERSE.name:
-        return multiverse.study_of(command.readings, command.smoke, command.first, command.per_block)
+        return _multiverse(command)
     return STUDIES[command.name]
+
+
+def _multiverse(command: Run) -> Study:
+    from sweeps.studies import multiverse
+
+    which = command.readings, command.smoke, command.first, command.per_block
+    if command.undecided is None:
+        return multiverse.study_of(*which)
+    if not command.keep:
+        refuse("keep", False, "True beside --undecided, which adds seeds to what a summary says of other readings")
+    seeds = size_of(command.seeds, command.episodes, "paper", command.smoke, multiverse.MULTIVERSE).seeds
+    study = multiverse.study_of(*which, multiverse.undecided(command.out, command.undecided, seeds))
+    if not study.sweeps:
+        refuse(
+            "undecided", command.undecided, f"a claim with undecided readings of fewer than {seeds} seeds among these"
+        )
+    return study
 
 
 def _client(command: Run) -> contextlib.AbstractContextManager:

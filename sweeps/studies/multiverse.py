@@ -6,6 +6,7 @@ added, resumed, or sent to other machines.
 
 from __future__ import annotations
 
+import csv
 import json
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
@@ -90,6 +91,8 @@ def block_sweep(
     uniform = {path: path for path in fig9.PATHS.values() if path}
     sources = [{"reading": float(n)} | _source(of) for n, of in zip(numbers, values, strict=True)]
     name = f"{study}/{numbers[0]:06d}-{numbers[-1]:06d}"
+    if len(numbers) <= numbers[-1] - numbers[0]:
+        name += f"-{len(numbers)}"  # some of them
     source = Sweep(
         name=f"{name}-source",
         description="source agents of these readings",
@@ -124,11 +127,14 @@ def _source(values: Mapping[str, float]) -> dict[str, float]:
     return {path: value for path, value in own.items() if path.startswith("env.") or path in ALWAYS_SHARED}
 
 
-def sweeps_of(number: int, first: int = 0, per_block: int = PER_BLOCK) -> tuple[Sweep, ...]:
-    """The blocks of readings `first` to `first + number`, with so many readings of each."""
-    values = [values_at(unit) for unit in unit_of(number, first)]
-    blocks = [range(b, min(b + per_block, first + number)) for b in range(first, first + number, PER_BLOCK)]
-    return tuple(block_sweep("multiverse", of, [values[i - first] for i in of]) for of in blocks)
+def sweeps_of(
+    number: int, first: int = 0, per_block: int = PER_BLOCK, asked: Collection[int] | None = None
+) -> tuple[Sweep, ...]:
+    """The blocks of readings `first` to `first + number`, with so many readings of each, of those asked for."""
+    values = {first + i: values_at(unit) for i, unit in enumerate(unit_of(number, first))}
+    blocks = [[n for n in values if n // PER_BLOCK == block] for block in sorted({n // PER_BLOCK for n in values})]
+    chosen = [[n for n in of if asked is None or n in asked][:per_block] for of in blocks]
+    return tuple(block_sweep("multiverse", of, [values[n] for n in of]) for of in chosen if of)
 
 
 MULTIVERSE = Study(
@@ -142,8 +148,14 @@ MULTIVERSE = Study(
 )
 
 
-def study_of(number: int | None, smoke: bool, first: int = 0, per_block: int = PER_BLOCK) -> Study:
-    """The study of the readings from `first` on, up to so many in all, with so many of each block.
+def study_of(
+    number: int | None,
+    smoke: bool,
+    first: int = 0,
+    per_block: int = PER_BLOCK,
+    asked: Collection[int] | None = None,
+) -> Study:
+    """The study of the readings from `first` on, up to so many in all, with so many of each block of those asked for.
 
     Raises:
       ValueError: naming the argument, the value and what is allowed.
@@ -154,7 +166,24 @@ def study_of(number: int | None, smoke: bool, first: int = 0, per_block: int = P
     if first not in range(0, number, PER_BLOCK):
         refuse("first", first, f"a multiple of {PER_BLOCK} from 0 on, less than readings = {number}")
     require_integer("per_block", per_block, 1, PER_BLOCK)
-    return MULTIVERSE.with_sweeps(sweeps_of(number - first, first, per_block))
+    return MULTIVERSE.with_sweeps(sweeps_of(number - first, first, per_block, asked))
+
+
+def undecided(out: Path, claim: str, seeds: int) -> list[int]:
+    """Readings that the summary in `out` has no verdict of a claim for, and fewer seeds than these.
+
+    Raises:
+      ValueError: naming `undecided`, if there is no such summary, or no such claim in it.
+    """
+    path = verdicts_file(out)
+    if not path.is_file():
+        refuse("undecided", claim, f"where an earlier run left its summary, and {path} is missing")
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    of_claim = [row for row in rows if row["claim"] == claim]
+    if not of_claim:
+        refuse("undecided", claim, ", ".join(dict.fromkeys(row["claim"] for row in rows)))
+    return [int(r["reading"]) for r in of_claim if r["verdict"] == "undecided" and int(r["n_seeds"]) < seeds]
 
 
 def verdicts_file(out: Path) -> Path:

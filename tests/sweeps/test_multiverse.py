@@ -16,7 +16,7 @@ from sweeps.__main__ import main
 from sweeps.engine.job import Job
 from sweeps.preset import base_of
 from sweeps.results import store
-from sweeps.studies.multiverse import POINTS, SMOKE, sweeps_of
+from sweeps.studies.multiverse import POINTS, SMOKE, sweeps_of, undecided
 from sweeps.studies.readings import (
     PER_BLOCK,
     READINGS,
@@ -180,6 +180,31 @@ def test_only_readings_with_seeds_enough_have_a_part_in_shares_of_verdicts(made_
     assert alone.supported.isna().all()
 
 
+def test_more_seeds_go_where_a_claim_is_undecided(made_up, tmp_path, capsys):
+    made_up("out", 2 * PER_BLOCK)
+    path = tmp_path / "out" / "multiverse" / "summary" / "verdicts.csv"
+    claim, found = "C3 (TLwD)", pd.read_csv(path)
+    decided = found.reading.isin([0, 2, 3, 64])
+    found.assign(verdict=np.where(decided, "supported", "undecided"), n_seeds=5).to_csv(path, index=False)
+    asked = undecided(tmp_path / "out", claim, 9)
+    assert asked == [n for n in range(2 * PER_BLOCK) if n not in (0, 2, 3, 64)]
+    assert undecided(tmp_path / "out", claim, 5) == []
+    sweeps = sweeps_of(2 * PER_BLOCK, per_block=3, asked=asked)
+    assert [sweep.name for sweep in sweeps] == ["multiverse/000001-000005-3", "multiverse/000065-000067"]
+    numbers = [np.unique(sweep.design.values("reading")).tolist() for sweep in sweeps]
+    assert numbers == [[1, 4, 5], [65, 66, 67]]
+    (alone,) = sweeps_of(1, first=4 * PER_BLOCK, asked=[4 * PER_BLOCK])
+    assert alone == sweeps_of(1, first=4 * PER_BLOCK)[0]
+    with pytest.raises(ValueError, match=r"undecided: 'C99'; allowed: C3 \(TLwD\)"):
+        undecided(tmp_path / "out", "C99", 9)
+    (tmp_path / "out" / "multiverse" / "summary" / "manifests.json").write_text(
+        '{"a": {"configuration": {"episodes": 450}}}'
+    )
+    run = ["run", "multiverse", "--keep", "--undecided", claim, "--seeds", "5", "--out", str(tmp_path / "out")]
+    assert main(run) == 2
+    assert "a claim with undecided readings of fewer than 5 seeds among these" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("flags", "message"),
     [
@@ -187,6 +212,12 @@ def test_only_readings_with_seeds_enough_have_a_part_in_shares_of_verdicts(made_
         (["multiverse", "--readings", "128", "--first", "128"], "first: 128; allowed: a multiple of 64"),
         (["multiverse", "--readings", "128", "--keep"], "keep: True; allowed: where an earlier run left its summary"),
         (["multiverse", "--per-block", "65"], "per_block: 65; allowed: an int from 1 to 64"),
+        (["multiverse", "--undecided", "C4"], "keep: False; allowed: True beside --undecided"),
+        (
+            ["multiverse", "--undecided", "C4", "--keep"],
+            "undecided: 'C4'; allowed: where an earlier run left its summary",
+        ),
+        (["fig6", "--undecided", "C4"], "name: 'fig6'; allowed: multiverse, for which alone --undecided is"),
         (["fig6", "--per-block", "6"], "name: 'fig6'; allowed: multiverse, for which alone --per-block is"),
         (["fig6", "--first", "64"], "name: 'fig6'; allowed: multiverse, for which alone --first is"),
         (["reconstruction", "--keep"], "name: 'reconstruction'; allowed: multiverse, for which alone --keep is"),
