@@ -160,15 +160,16 @@ def _together(published: Path, verdicts: pd.DataFrame) -> str:
     labels = {reading.path: reading.label for reading in READINGS}
     both = np.all([places[labels[path]] == answer for path, answer in chosen.items()], axis=0)
     worthwhile, _ = of_multiverse(tried_in(published))
+
+    def apart(holds: pd.Series) -> str:
+        here = both[holds.index.to_numpy(int)]
+        return " and ".join(percent(holds.loc[of].mean()) for of in (here, ~here))
+
     parts = []
     for claim in TOGETHER:
         holds = verdicts.query("claim == @claim and reading > 0").set_index("reading").holds.astype(bool)
-        here = pd.Series(both[holds.index.to_numpy(int)], holds.index)
-        with_one = holds.index.isin(worthwhile.index)
-        everywhere, worth_it = (
-            [percent(holds.loc[of & which].mean()) for which in (here, ~here)] for of in (here | True, with_one)
-        )
-        parts.append(f"{claim} holds in {' and '.join(everywhere)} (with a trade-off: {' and '.join(worth_it)})")
+        worth_it = holds.loc[holds.index.isin(worthwhile.index)]
+        parts.append(f"{claim} holds in {apart(holds)} (with a trade-off: {apart(worth_it)})")
     return (
         "With the Huber loss in the target and Table I's source together, and in all others, "
         + "; ".join(parts)
