@@ -5,6 +5,7 @@ Other work on a shared machine then slows all cases alike, and ratios of one run
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
 import resource
 import statistics
@@ -143,7 +144,8 @@ class Running:
     def repeat(self) -> None:
         """Times one repetition."""
         for pipe in self._pipes:
-            pipe.send(True)
+            with contextlib.suppress(BrokenPipeError):  # its process has ended, as the answer will say
+                pipe.send(True)
         answers = self._answers()
         steps = self.case.agents * self.case.processes * self.case.steps
         self._repetitions.append(max(seconds for seconds, _ in answers) / steps * 1e6)

@@ -1,8 +1,11 @@
 """Benchmarks: a case that ends with its process, or lacks a package, leaves the other cases measured."""
 
 import os
+import threading
 
-from benchmarks.measure import Case, Ready, in_turns, print_table
+import pytest
+
+from benchmarks.measure import Case, NotMeasured, Ready, Running, in_turns, print_table
 
 
 def sound(agents, steps):
@@ -18,8 +21,20 @@ def ends_in_second_repetition(agents, steps):
     return Ready(lambda: next(calls, 0) is None or os._exit(4), 0.5)
 
 
+def ends_between_repetitions(agents, steps):
+    threading.Timer(1.0, os._exit, (5,)).start()
+    return Ready(lambda: None, 0.5)
+
+
 def without_package(agents, steps):
     raise ModuleNotFoundError("no", name="rejax")
+
+
+def test_a_process_that_ends_while_nobody_asks():
+    running = Running(Case("idle", ends_between_repetitions, 2, 10))
+    running._processes[0].join()
+    with pytest.raises(NotMeasured, match="ended with status 5"):
+        running.repeat()
 
 
 def test_the_other_cases_are_measured(capsys):
