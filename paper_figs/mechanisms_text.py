@@ -35,7 +35,7 @@ def huber_list(published: Path) -> str:
     first, last = float(deltas.min()), float(deltas.max())
     sentences = []
     for x in (first, last):
-        learners = (f"{style.LOOKS[name].label} {what_of(name, x)}" for name in ("ddqn", "dpr", "tlwd"))
+        learners = (f"{style.LOOKS[name].label} {what_of(name, x)}" for name in _LEARNERS)
         sentences.append(f"delta = {x:g}: {'; '.join(learners)}.")
     explored = short(means.loc[(first, "explored")].iloc[0])
     optimum = f"The optimal policy: {what_of('optimum', first)}; with the learners' exploration {explored}."
@@ -64,8 +64,8 @@ def step_sizes_in_short(published: Path) -> str:
     when += [f"never with {rate} or less" for rate, _ in episodes[last + 1 : last + 2]]
     return (
         f"All else as by default, TLwD earns more than DDQN at every p_1^v with step sizes of {_or_none(ahead)}, less "
-        f"at most with {_or_none(behind)}; DDQN converges at p_1^v = {_AT} (median) in episode {', '.join(when)} "
-        "([why](docs/explanation/readings.md#why-small-steps))."
+        f"at most of them with {_or_none(behind)}; DDQN converges at p_1^v = {_AT} (median) in episode "
+        f"{', '.join(when)} ([why](docs/explanation/readings.md#why-small-steps))."
     )
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import pandas as pd
 
+from paper_figs.claims.judge import VERDICTS
 from paper_figs.claims.table import number_of
 from paper_figs.markdown import percent
 from paper_figs.studies import multiverse
@@ -106,7 +107,7 @@ def named(reading: str) -> str:
 
 def counted(best: pd.DataFrame) -> str:
     """Verdicts, counted."""
-    return ", ".join(f"{(best.verdict == v).sum()} {v}" for v in ("supported", "contradicted", "undecided"))
+    return ", ".join(f"{(best.verdict == v).sum()} {v}" for v in VERDICTS)
 
 
 def pair(values: Mapping[Hashable, Any]) -> str:

@@ -11,10 +11,11 @@ import numpy as np
 import pandas as pd
 
 from jrcjax.readings import Loss
+from paper_figs.claims.judge import VERDICTS
 from paper_figs.claims.results import Rules
 from paper_figs.markdown import listed, paragraph, percent, table
 from paper_figs.mechanisms_text import step_sizes_in_short
-from paper_figs.published import NAMED, csv_of, held, of_multiverse, share, share_of, tried_in
+from paper_figs.published import NAMED, csv_of, held, holds_in, of_multiverse, share, share_of, tried_in
 from paper_figs.studies import multiverse
 from sweeps.design import in_range
 from sweeps.preset import SOURCES
@@ -47,9 +48,7 @@ def _deciding(sensitivity: pd.DataFrame, claim: str, most: int = 3) -> str:
 
 def readings_list(published: Path) -> str:
     """In which share of the readings the statements hold, and what decides, for the first page."""
-    claims, sensitivity, verdicts = (
-        csv_of(published, MULTIVERSE.name, name) for name in ("claims", "sensitivity", "verdicts")
-    )
+    claims, sensitivity = (csv_of(published, MULTIVERSE.name, name) for name in ("claims", "sensitivity"))
     worthwhile, idle = of_multiverse(tried_in(published))
     judged, by_name = int(claims.judged.max()), {row["claim"]: row for row in claims.to_dict("records")}
     rows = [
@@ -58,7 +57,7 @@ def readings_list(published: Path) -> str:
             _holds(by_name[name]),
             held(published, worthwhile, name),
             *([f"{percent(by_name[name][v])}" for v in ("supported", "contradicted")] if judged else []),
-            _deciding_where(verdicts, sensitivity, name),
+            _deciding_where(published, sensitivity, name),
         )
         for name in NAMED
     ]
@@ -72,27 +71,30 @@ def readings_list(published: Path) -> str:
         + (of_judged if judged else "")
         + "; and total-order indices of what decides it:"
     )
-    return (
-        f"{about}\n\n{table(head, rows)}\n\n{listed([_together(published, verdicts), step_sizes_in_short(published)])}"
-    )
+    return f"{about}\n\n{table(head, rows)}\n\n{listed([_together(published), step_sizes_in_short(published)])}"
 
 
-def _deciding_where(verdicts: pd.DataFrame, sensitivity: pd.DataFrame, claim: str) -> str:
+def _deciding_where(published: Path, sensitivity: pd.DataFrame, claim: str) -> str:
     """The two questions that decide a statement most, each with the answer with which it holds most often."""
     found = []
     for row in _strongest(sensitivity, claim, 2).to_dict("records"):
-        names, which, holds = _by_answer(verdicts, claim, str(row["input"]))
+        names, which, holds = _by_answer(published, claim, str(row["input"]))
         most = max(range(len(names)), key=lambda i: holds[which == i].mean())
         found.append(f"{row['input']} {row['total']:.2f} ({names[most]})")
     return ", ".join(found) or "no single question"
 
 
-def _by_answer(verdicts: pd.DataFrame, claim: str, label: str) -> tuple[list[str], np.ndarray, pd.Series]:
+def _by_answer(published: Path, claim: str, label: str) -> tuple[list[str], np.ndarray, pd.Series]:
     """Names of a question's answers; which of them each reading has; and whether a statement holds in it."""
-    sampled = verdicts.query("claim == @claim and reading > 0").set_index("reading")
-    places = multiverse.places(int(verdicts.reading.max()) + 1)[label]
+    holds = holds_in(published, claim).drop(0)  # the default is no point of the sample
     (reading,) = (reading for reading in READINGS if reading.label == label)
-    return *_answers(reading, places.loc[sampled.index].to_numpy()), sampled.holds.astype(bool)
+    return *_answers(reading, _places_of(holds)[label].to_numpy()), holds
+
+
+def _places_of(holds: pd.Series) -> pd.DataFrame:
+    """Places of the readings that a series is about."""
+    numbers = holds.index.to_numpy(int)
+    return multiverse.places(int(numbers.max(initial=0)) + 1).loc[numbers]
 
 
 def never_judged_so(published: Path, claims: list[str]) -> str:
@@ -109,7 +111,7 @@ def never_judged_so(published: Path, claims: list[str]) -> str:
 def judged_table(published: Path) -> str:
     """One row per statement: shares of its verdicts in the readings that have seeds enough for one."""
     claims = csv_of(published, MULTIVERSE.name, "claims")
-    names = (*multiverse.VERDICTS, "negligible")
+    names = (*VERDICTS, "negligible")
     rows = [
         (row["claim"], *(share(row, name) for name in names)) for row in claims.query("judged > 0").to_dict("records")
     ]
@@ -131,9 +133,7 @@ def judged_list(published: Path) -> str:
     return listed(
         [
             f"{judged.reading.nunique()} of {verdicts.reading.nunique()} readings have {seeds} seeds each, and "
-            f"{len(judged)} verdicts: "
-            + ", ".join(f"{(judged.verdict == v).sum()} {v}" for v in multiverse.VERDICTS)
-            + ".",
+            f"{len(judged)} verdicts: " + ", ".join(f"{(judged.verdict == v).sum()} {v}" for v in VERDICTS) + ".",
             *in_words,
             f"Supported in none of them: {'; '.join(never) or 'none'}.",
         ]
@@ -153,21 +153,20 @@ def extremes_list(published: Path) -> str:
     )
 
 
-def _together(published: Path, verdicts: pd.DataFrame) -> str:
+def _together(published: Path) -> str:
     """What the loss and the source decide together, everywhere and where there is a trade-off."""
-    places = multiverse.places(int(verdicts.reading.max()) + 1)
     chosen = {"hparams.loss": Loss.HUBER.value, SOURCE: SOURCES.index("table1")}
     labels = {reading.path: reading.label for reading in READINGS}
-    both = np.all([places[labels[path]] == answer for path, answer in chosen.items()], axis=0)
     worthwhile, _ = of_multiverse(tried_in(published))
 
     def apart(holds: pd.Series) -> str:
-        here = both[holds.index.to_numpy(int)]
+        places = _places_of(holds)
+        here = np.all([places[labels[path]] == answer for path, answer in chosen.items()], axis=0)
         return " and ".join(percent(holds.loc[of].mean()) for of in (here, ~here))
 
     parts = []
     for claim in TOGETHER:
-        holds = verdicts.query("claim == @claim and reading > 0").set_index("reading").holds.astype(bool)
+        holds = holds_in(published, claim).drop(0)
         worth_it = holds.loc[holds.index.isin(worthwhile.index)]
         parts.append(f"{claim} holds in {apart(holds)} (with a trade-off: {apart(worth_it)})")
     return (
@@ -195,11 +194,10 @@ def decided_table(published: Path) -> str:
 
 def answers_table(published: Path) -> str:
     """Where the statements of the first page hold, by the answers to the two questions that decide each most."""
-    verdicts, sensitivity = (csv_of(published, MULTIVERSE.name, name) for name in ("verdicts", "sensitivity"))
-    rows = []
+    sensitivity, rows = csv_of(published, MULTIVERSE.name, "sensitivity"), []
     for claim in NAMED:
         for label in _strongest(sensitivity, claim, 2)["input"]:
-            names, which, holds = _by_answer(verdicts, claim, label)
+            names, which, holds = _by_answer(published, claim, label)
             cells = [f"{name}: {share_of(holds.loc[which == i])}" for i, name in enumerate(names)]
             rows.append((claim, label, "; ".join(cells)))
     return table(("statement", "question", "holds in (95 % interval), by answer"), rows)

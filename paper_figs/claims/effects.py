@@ -6,7 +6,6 @@ All differences are paired: learners share their seeds.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
@@ -40,10 +39,10 @@ Effect = Callable[[Results], Measured]
 
 def learners_of(effect: Effect) -> frozenset[str]:
     """Names of the learners that an effect compares."""
-    values = {f.name: getattr(effect, f.name) for f in dataclasses.fields(effect)}  # pyright: ignore[reportArgumentType]
-    names = [values[field] for field in ("of", "over", "against", "than") if field in values]
-    agents = [name for value in names for name in (value if type(value) is tuple else (value,))]
-    return frozenset(a.name if isinstance(a, Agent) else a for a in agents if isinstance(a, Agent | str))
+    fields = [getattr(effect, name, ()) for name in ("of", "over", "against", "than")]
+    agents = [one for field in fields for one in (field if type(field) is tuple else (field,))]  # an Agent is a tuple
+    names = [one.name if isinstance(one, Agent) else one for one in agents]
+    return frozenset(name for name in names if isinstance(name, str))  # `over` may be a point's value
 
 
 def metric_of(effect: Effect) -> str:

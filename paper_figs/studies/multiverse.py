@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from paper_figs.analysis.intervals import Interval, clustered_share
 from paper_figs.analysis.sensitivity import LEAST_POINTS, sensitivity
 from paper_figs.claims.effects import learners_of, metric_of
-from paper_figs.claims.judge import Claim, Judgement, is_on_its_side
+from paper_figs.claims.judge import VERDICTS, Claim, Judgement, is_on_its_side
 from paper_figs.claims.results import Rules
 from paper_figs.claims.table import CLAIMS, claims_of, number_of
 from paper_figs.cores import on_cores
@@ -21,7 +21,6 @@ from sweeps.studies.multiverse import POINTS
 from sweeps.studies.readings import PER_BLOCK, READINGS, SOURCE, Reading, range_of, unit_of, values_at
 
 FIGURES = ("fig5b", "fig6", "fig7", "fig8", "fig9")
-VERDICTS = ("supported", "contradicted", "undecided")
 
 
 def claims_in(source: xr.Dataset, target: xr.Dataset) -> list[Judgement]:
@@ -143,7 +142,9 @@ def decisive(found: pd.DataFrame, episodes: int) -> dict[str, pd.DataFrame]:
       episodes: length of the runs.
     """
     sampled = found.query("reading > 0")  # reading 0 is the default and no point of the sample
-    sampled = sampled.assign(value=sampled.value.replace(np.inf, episodes)).dropna(subset="value")
+    never = np.isposinf(sampled.value) & sampled.claim.isin([c.claim for c in CLAIMS if c.unit == "episode"])
+    sampled = sampled.assign(value=sampled.value.mask(never, episodes))
+    sampled = sampled[np.isfinite(sampled.value.to_numpy(float))]
     inputs = places(int(found.reading.max()) + 1)
     of_claims = ((claim, sampled[sampled.claim == claim.claim]) for claim in CLAIMS)
     enough = [(claim, of_claim, inputs) for claim, of_claim in of_claims if len(of_claim) >= LEAST_POINTS]

@@ -86,3 +86,12 @@ def test_runs_that_never_converge_have_a_part_in_what_decides():
     assert table.total["loss"] > 0.9
     assert table.drop("loss").total.max() < 0.1
     assert "weight of the margin" not in table.index
+
+
+def test_an_infinite_ratio_is_no_effect():
+    values = multiverse.places(129)["loss"].to_numpy(float).copy()
+    values[5:15] = np.inf
+    with joblib.parallel_config(backend="sequential"):
+        table = multiverse.decisive(of_claim("C12 (throughput, DDQN)", values), 450)["sensitivity"]
+    assert (table.readings == 118).all()
+    assert table.set_index("input").total["loss"] > 0.9
