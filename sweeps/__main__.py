@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import tyro
 
@@ -20,6 +20,8 @@ from sweeps.options import FLAGS, Count, Preset
 from sweeps.preset import preset_of
 from sweeps.studies.custom import CUSTOM, Options, custom_sweep
 from sweeps.sweep import Study, size_of
+
+_UNDECIDED = "paper_figs.studies.multiverse:undecided"
 
 
 @dataclass(frozen=True)
@@ -60,14 +62,14 @@ class Run:
     first: int = 0
     """Of the multiverse, the first reading to run, a multiple of 64."""
     per_block: int = 64
-    """Of the multiverse, how many readings of each block of 64, within which all have the same answers to what decides
-    code; with few, more seeds go to readings from everywhere in the space."""
+    """Of the multiverse, the first so many readings of each block of 64, within which all have the same answers to what
+    decides code; with few, more seeds go to readings from everywhere in the space."""
     keep: bool = False
     """Of the multiverse, keep what the summary in OUT/multiverse/summary, which an earlier run wrote, says of other
     readings."""
     undecided: Annotated[str | None, tyro.conf.arg(metavar="CLAIM")] = None
     """Of the multiverse, with --keep: only readings that the summary has no verdict of this claim for, such as
-    "C5 (highest)", and fewer seeds than --seeds."""
+    "C5 (highest)", and fewer seeds than --seeds, at the points of the claim's figure alone."""
     confirm: Count = None
     """Of the reconstruction, how many fresh seeds confirm what it found. Default: 100, or 1 with --smoke."""
     custom: tyro.conf.OmitArgPrefixes[Options] = field(default_factory=Options)
@@ -144,8 +146,8 @@ def _run(command: Command) -> int:
     return 0
 
 
-def _found(name: str) -> Callable[..., list[Path]]:
-    """The function that a study names as module:function."""
+def _found(name: str) -> Callable[..., Any]:
+    """The function that is named as module:function, of a package that imports this one."""
     module, function = name.split(":")
     return getattr(importlib.import_module(module), function)
 
@@ -182,7 +184,7 @@ def _multiverse(command: Run) -> Study:
     if not command.keep:
         refuse("keep", False, "True beside --undecided, which adds seeds to what a summary says of other readings")
     seeds = size_of(command.seeds, command.episodes, "paper", command.smoke, multiverse.MULTIVERSE).seeds
-    study = multiverse.study_of(*which, multiverse.undecided(command.out, command.undecided, seeds))
+    study = multiverse.study_of(*which, *_found(_UNDECIDED)(command.out, command.undecided, seeds))
     if not study.sweeps:
         refuse(
             "undecided", command.undecided, f"a claim with undecided readings of fewer than {seeds} seeds among these"

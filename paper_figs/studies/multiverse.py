@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 from matplotlib.figure import Figure
 
+from jrcjax.checks import refuse
+from jrcjax.types import choice
 from paper_figs.analysis.intervals import Interval, clustered_share
 from paper_figs.analysis.sensitivity import LEAST_POINTS, sensitivity
 from paper_figs.claims.effects import learners_of, metric_of
-from paper_figs.claims.judge import VERDICTS, Claim, Judgement, is_on_its_side
+from paper_figs.claims.judge import UNDECIDED, VERDICTS, Claim, Judgement, is_on_its_side
 from paper_figs.claims.results import Rules
 from paper_figs.claims.table import CLAIMS, claims_of, number_of
 from paper_figs.cores import on_cores
 from paper_figs.plots import readings as plot
-from sweeps.studies.multiverse import POINTS
+from sweeps.studies.multiverse import points_of, verdicts_file
 from sweeps.studies.readings import PER_BLOCK, READINGS, SOURCE, Reading, range_of, unit_of, values_at
 
 FIGURES = ("fig5b", "fig6", "fig7", "fig8", "fig9")
@@ -30,9 +33,10 @@ def claims_in(source: xr.Dataset, target: xr.Dataset) -> list[Judgement]:
       source: results in its source environment, one point.
       target: results at its POINTS, or at those of some figures; of other figures nothing is known.
     """
-    figures = [set(POINTS[i].figures) for i in target["point_of_reading"].values.astype(int)]
-    places = {name: [place for place, of in enumerate(figures) if name in of] for name in FIGURES}
-    return claims_of({"fig5a": source} | {name: target.isel(point=points) for name, points in places.items()})
+    there = target["point_of_reading"].values.astype(int).tolist()
+    places = {name: [there.index(i) for i in points_of({name}) if i in there] for name in FIGURES}
+    whole = [name for name in FIGURES if len(places[name]) == len(points_of({name}))]
+    return claims_of({"fig5a": source} | {name: target.isel(point=places[name]) for name in whole})
 
 
 def of_readings(source: xr.Dataset, target: xr.Dataset) -> Iterator[tuple[int, list[Judgement]]]:
@@ -43,7 +47,7 @@ def of_readings(source: xr.Dataset, target: xr.Dataset) -> Iterator[tuple[int, l
 
 
 def verdicts(judged: list[tuple[int, list[Judgement]]]) -> pd.DataFrame:
-    """One row per reading and claim: the effect with its interval, and the verdict.
+    """One row per reading and claim whose figure was run: the effect with its interval, and the verdict.
 
     A claim `holds` if its estimate, whatever its interval, is on the claim's side.
     """
@@ -61,8 +65,36 @@ def verdicts(judged: list[tuple[int, list[Judgement]]]) -> pd.DataFrame:
         }
         for number, of_reading in judged
         for c in of_reading
+        if c.n_seeds
     ]
     return pd.DataFrame(rows)
+
+
+def with_more_seeds(known: pd.DataFrame, found: pd.DataFrame) -> pd.DataFrame:
+    """The verdicts of both, see `verdicts`; of a claim in a reading that of more seeds, or else the one just found."""
+    place = {claim.claim: place for place, claim in enumerate(CLAIMS)}
+    both = pd.concat([known, found])
+    both = both.iloc[np.lexsort((both.n_seeds, both.claim.map(place), both.reading))]
+    return both.drop_duplicates(["reading", "claim"], keep="last")
+
+
+def undecided(out: Path, claim: str, seeds: int) -> tuple[list[int], str]:
+    """Readings that the summary in `out` has no verdict of a claim for, and fewer seeds than these.
+
+    Returns:
+      The readings, and the figure whose points the claim is about.
+
+    Raises:
+      ValueError: naming `undecided`, if there is no such summary, or no such claim in it.
+    """
+    path = verdicts_file(out)
+    if not path.is_file():
+        refuse("undecided", claim, f"where an earlier run left its summary, and {path} is missing")
+    found = pd.read_csv(path)
+    figures = {c.claim: c.sweep for c in CLAIMS if c.claim in set(found.claim)}
+    choice("undecided", claim, tuple(figures))
+    asked = found[(found.claim == claim) & (found.verdict == UNDECIDED) & (found.n_seeds < seeds)]
+    return asked.reading.tolist(), figures[claim]
 
 
 def agreement(of_reading: pd.DataFrame) -> pd.Series:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
 from jrcjax.files import write_text
@@ -50,16 +49,14 @@ def summarise_multiverse(sweeps: tuple[Sweep, ...], size: Size, out: Path, keep:
       sweeps: the blocks of readings that were run.
       size: of the runs.
       out: the folder of all results.
-      keep: whether what the summary says of other readings is kept.
+      keep: whether what the summary says of other readings, or of these from more seeds, is kept.
     """
     path = verdicts_file(out)
     folder = path.parent
     folder.mkdir(parents=True, exist_ok=True)
     found = pd.concat(on_cores(_of_block, ((sweep, size, out) for sweep in sweeps)))
     if keep:
-        known = pd.read_csv(path)
-        found = pd.concat([known[~known.reading.isin(found.reading)], found])
-        found = found.iloc[np.argsort(found.reading.to_numpy(), kind="stable")]
+        found = multiverse.with_more_seeds(pd.read_csv(path), found)
     style.save_table(found, path)
     found = pd.read_csv(path)  # so that conclusions are the same whether readings came from this run or an earlier one
     tables = {

@@ -6,7 +6,7 @@ added, resumed, or sent to other machines.
 
 from __future__ import annotations
 
-import csv
+import itertools
 import json
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
@@ -29,6 +29,7 @@ SIZE = Size(seeds=2, episodes=450)
 """The claims speak of episodes up to 400, and of what follows."""
 SMOKE = Size(seeds=2, episodes=20, pretraining=50, demonstrations=400)
 _NUMBER, _SMOKE_NUMBER, _MOST = 512, 2, 2**20
+_LANES = 128  # seeds times points in a part, as far as points allow
 
 
 class Point(NamedTuple):
@@ -71,7 +72,7 @@ def block_sweep(
     numbers: Sequence[int],
     values: Sequence[Mapping[str, float]],
     points: Sequence[int] = range(len(POINTS)),
-    seeds_per_part: int = SIZE.seeds,
+    seeds_per_part: int = Sweep.seeds_per_part,
 ) -> Sweep:
     """Points of some readings, as one program for each optimiser and n.
 
@@ -80,7 +81,7 @@ def block_sweep(
       numbers: of the readings, ascending.
       values: of each reading by path; what is left out is as by default.
       points: places in POINTS.
-      seeds_per_part: see `Sweep`; readings of a block fill the devices with few seeds.
+      seeds_per_part: see `Sweep`.
     """
     number = {"prioritised": 1.0}
     rows = [
@@ -128,13 +129,33 @@ def _source(values: Mapping[str, float]) -> dict[str, float]:
 
 
 def sweeps_of(
-    number: int, first: int = 0, per_block: int = PER_BLOCK, asked: Collection[int] | None = None
+    number: int,
+    first: int = 0,
+    per_block: int = PER_BLOCK,
+    asked: Collection[int] | None = None,
+    figure: str | None = None,
 ) -> tuple[Sweep, ...]:
-    """The blocks of readings `first` to `first + number`, with so many readings of each, of those asked for."""
+    """The blocks of readings `first` to `first + number`: the first so many of each, or those of them asked for.
+
+    Args:
+      number: of readings.
+      first: of the readings, the first of a block.
+      per_block: how many readings of each block.
+      asked: the readings asked for; all if None.
+      figure: whose points are run, with the target as it is; all if None.
+    """
     values = {first + i: values_at(unit) for i, unit in enumerate(unit_of(number, first))}
-    blocks = [[n for n in values if n // PER_BLOCK == block] for block in sorted({n // PER_BLOCK for n in values})]
-    chosen = [[n for n in of if asked is None or n in asked][:per_block] for of in blocks]
-    return tuple(block_sweep("multiverse", of, [values[n] for n in of]) for of in chosen if of)
+    blocks = [list(of)[:per_block] for _, of in itertools.groupby(values, lambda n: n // PER_BLOCK)]
+    chosen = [[n for n in of if asked is None or n in asked] for of in blocks]
+    name, points = "multiverse", tuple(range(len(POINTS)))
+    if figure is not None:
+        name, points = f"{name}/{figure}", points_of({figure})
+    return tuple(block_sweep(name, of, [values[n] for n in of], points, _per_part(of, points)) for of in chosen if of)
+
+
+def _per_part(readings: Sequence[int], points: Sequence[int]) -> int:
+    """Seeds of a part, more of them where few readings and points would not fill the devices' blocks."""
+    return max(SIZE.seeds, min(Sweep.seeds_per_part, _LANES // (len(readings) * len(points))))
 
 
 MULTIVERSE = Study(
@@ -154,8 +175,9 @@ def study_of(
     first: int = 0,
     per_block: int = PER_BLOCK,
     asked: Collection[int] | None = None,
+    figure: str | None = None,
 ) -> Study:
-    """The study of the readings from `first` on, up to so many in all, with so many of each block of those asked for.
+    """The study of the readings from `first` on, up to so many in all; for the rest see `sweeps_of`.
 
     Raises:
       ValueError: naming the argument, the value and what is allowed.
@@ -166,24 +188,7 @@ def study_of(
     if first not in range(0, number, PER_BLOCK):
         refuse("first", first, f"a multiple of {PER_BLOCK} from 0 on, less than readings = {number}")
     require_integer("per_block", per_block, 1, PER_BLOCK)
-    return MULTIVERSE.with_sweeps(sweeps_of(number - first, first, per_block, asked))
-
-
-def undecided(out: Path, claim: str, seeds: int) -> list[int]:
-    """Readings that the summary in `out` has no verdict of a claim for, and fewer seeds than these.
-
-    Raises:
-      ValueError: naming `undecided`, if there is no such summary, or no such claim in it.
-    """
-    path = verdicts_file(out)
-    if not path.is_file():
-        refuse("undecided", claim, f"where an earlier run left its summary, and {path} is missing")
-    with path.open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
-    of_claim = [row for row in rows if row["claim"] == claim]
-    if not of_claim:
-        refuse("undecided", claim, ", ".join(dict.fromkeys(row["claim"] for row in rows)))
-    return [int(r["reading"]) for r in of_claim if r["verdict"] == "undecided" and int(r["n_seeds"]) < seeds]
+    return MULTIVERSE.with_sweeps(sweeps_of(number - first, first, per_block, asked, figure))
 
 
 def verdicts_file(out: Path) -> Path:

@@ -62,7 +62,7 @@ def of_seeds(size: Size, seeds: int) -> Size:
 def generation_sweep(first: int, units: Sequence[np.ndarray]) -> Sweep:
     """Readings at some places of the unit cube, numbered from `first` on, as one block."""
     numbers = range(first, first + len(units))
-    return block_sweep(f"{NAME}/tried", numbers, [values_at(unit) for unit in units])
+    return block_sweep(f"{NAME}/tried", numbers, [values_at(unit) for unit in units], seeds_per_part=SIZE.seeds)
 
 
 def confirmation_sweep(unit: np.ndarray, figures: Collection[str]) -> Sweep:

@@ -12,11 +12,12 @@ import pytest
 import jrcjax
 from jrcjax.config.paths import number_at, parameter_at
 from paper_figs.studies import summaries
+from paper_figs.studies.multiverse import undecided, with_more_seeds
 from sweeps.__main__ import main
 from sweeps.engine.job import Job
 from sweeps.preset import base_of
 from sweeps.results import store
-from sweeps.studies.multiverse import POINTS, SMOKE, sweeps_of, undecided
+from sweeps.studies.multiverse import POINTS, SMOKE, sweeps_of
 from sweeps.studies.readings import (
     PER_BLOCK,
     READINGS,
@@ -186,16 +187,15 @@ def test_more_seeds_go_where_a_claim_is_undecided(made_up, tmp_path, capsys):
     claim, found = "C3 (TLwD)", pd.read_csv(path)
     decided = found.reading.isin([0, 2, 3, 64])
     found.assign(verdict=np.where(decided, "supported", "undecided"), n_seeds=5).to_csv(path, index=False)
-    asked = undecided(tmp_path / "out", claim, 9)
+    asked, figure = undecided(tmp_path / "out", claim, 9)
     assert asked == [n for n in range(2 * PER_BLOCK) if n not in (0, 2, 3, 64)]
-    assert undecided(tmp_path / "out", claim, 5) == []
-    sweeps = sweeps_of(2 * PER_BLOCK, per_block=3, asked=asked)
-    assert [sweep.name for sweep in sweeps] == ["multiverse/000001-000005-3", "multiverse/000065-000067"]
-    numbers = [np.unique(sweep.design.values("reading")).tolist() for sweep in sweeps]
-    assert numbers == [[1, 4, 5], [65, 66, 67]]
-    (alone,) = sweeps_of(1, first=4 * PER_BLOCK, asked=[4 * PER_BLOCK])
-    assert alone == sweeps_of(1, first=4 * PER_BLOCK)[0]
-    with pytest.raises(ValueError, match=r"undecided: 'C99'; allowed: C3 \(TLwD\)"):
+    assert figure == "fig5b"
+    assert undecided(tmp_path / "out", claim, 5)[0] == []
+    sweeps = sweeps_of(2 * PER_BLOCK, per_block=5, asked=asked, figure=figure)
+    assert [sweep.name for sweep in sweeps] == [f"multiverse/fig5b/{a}" for a in ("000001-000004-2", "000065-000068")]
+    numbers = [sweep.design.values("reading").tolist() for sweep in sweeps]  # one point of each
+    assert numbers == [[1, 4], [65, 66, 67, 68]]
+    with pytest.raises(ValueError, match=r"undecided: 'C99' is unknown; allowed: 'C3 \(TLwD\)'"):
         undecided(tmp_path / "out", "C99", 9)
     (tmp_path / "out" / "multiverse" / "summary" / "manifests.json").write_text(
         '{"a": {"configuration": {"episodes": 450}}}'
@@ -203,6 +203,32 @@ def test_more_seeds_go_where_a_claim_is_undecided(made_up, tmp_path, capsys):
     run = ["run", "multiverse", "--keep", "--undecided", claim, "--seeds", "5", "--out", str(tmp_path / "out")]
     assert main(run) == 2
     assert "a claim with undecided readings of fewer than 5 seeds among these" in capsys.readouterr().err
+
+
+def test_the_points_of_a_figure_are_those_of_the_whole_reading():
+    (whole,), (part,) = sweeps_of(2), sweeps_of(2, asked=[1], figure="fig6")
+    expected = frame(whole).query("reading == 1 and point_of_reading < 4").reset_index(drop=True)
+    found = frame(part)
+    assert len(found) == 4
+    pd.testing.assert_frame_equal(found, expected[found.columns])
+    left_out = expected.drop(columns=found.columns)
+    assert (left_out.nunique(dropna=False) <= 1).all()  # of the other figures, or as in reading 0
+    pd.testing.assert_frame_equal(frame(part.source), frame(whole.source).iloc[[1]].reset_index(drop=True))
+
+
+def test_a_verdict_of_fewer_seeds_does_not_take_the_place_of_one_of_more():
+    def table(n_seeds, *readings, claims=("C1 (reached)", "C3 (TLwD)")):
+        rows = [
+            {"reading": n, "claim": claim, "n_seeds": n_seeds, "value": n_seeds} for n in readings for claim in claims
+        ]
+        return pd.DataFrame(rows)
+
+    known = pd.concat([table(2, 0, 1), table(20, 2, claims=["C3 (TLwD)"]), table(5, 2, claims=["C1 (reached)"])])
+    both = with_more_seeds(known, table(10, 2, 1)).set_index(["reading", "claim"])
+    assert both.index.tolist() == [(n, claim) for n in range(3) for claim in ("C1 (reached)", "C3 (TLwD)")]
+    assert both.n_seeds.tolist() == [2, 2, 10, 10, 10, 20]
+    again = with_more_seeds(both.reset_index(), table(10, 1).assign(value=0.5))
+    assert again[again.reading == 1].value.tolist() == [0.5, 0.5]
 
 
 @pytest.mark.parametrize(
