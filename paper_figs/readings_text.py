@@ -124,7 +124,7 @@ def judged_list(published: Path) -> str:
     judged = verdicts[verdicts.n_seeds >= Rules().least_seeds]
     if judged.empty:
         return listed([f"No reading has seeds enough for a verdict, which takes {Rules().least_seeds}."])
-    seeds = ", ".join(f"{n:.0f}" for n in sorted(judged.n_seeds.unique()))
+    seeds = ", ".join(f"{count} of {n:.0f} seeds" for n, count in judged.n_seeds.value_counts().sort_index().items())
     mostly = {v: claims.claim[claims[f"{v}_low"] > 0.5] for v in ("supported", "contradicted")}
     never = claims.claim[claims.supported == 0]
     in_words = [
@@ -132,8 +132,8 @@ def judged_list(published: Path) -> str:
     ]
     return listed(
         [
-            f"{judged.reading.nunique()} of {verdicts.reading.nunique()} readings have {seeds} seeds each, and "
-            f"{len(judged)} verdicts: " + ", ".join(f"{(judged.verdict == v).sum()} {v}" for v in VERDICTS) + ".",
+            f"{judged.reading.nunique()} of {verdicts.reading.nunique()} readings have seeds enough for {len(judged)} "
+            f"verdicts ({seeds}): " + ", ".join(f"{(judged.verdict == v).sum()} {v}" for v in VERDICTS) + ".",
             *in_words,
             f"Supported in none of them: {'; '.join(never) or 'none'}.",
         ]

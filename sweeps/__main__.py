@@ -62,8 +62,8 @@ class Run:
     first: int = 0
     """Of the multiverse, the first reading to run, a multiple of 64."""
     per_block: int = 64
-    """Of the multiverse, the first so many readings of each block of 64, within which all have the same answers to what
-    decides code; with few, more seeds go to readings from everywhere in the space."""
+    """Of the multiverse, so many readings of each block of 64, within which all have the same answers to what decides
+    code: a random sample, always the same; with few, more seeds go to readings from everywhere in the space."""
     keep: bool = False
     """Of the multiverse, keep what the summary in OUT/multiverse/summary, which an earlier run wrote, says of other
     readings."""

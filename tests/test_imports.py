@@ -18,6 +18,7 @@ FLOORS = (
         "containers",
         "named",
         "files",
+        "kept",
         "machine",
         "numerics",
         "rng",

@@ -19,6 +19,7 @@ from jaxtyping import Array, Float, Int
 from jrcjax import rng
 from jrcjax.checks import is_positive, is_traced, refuse, require
 from jrcjax.containers import NOT_NEGATIVE, PROBABILITY, count, derived, integer, option
+from jrcjax.kept import kept
 from jrcjax.keys import key_of
 from jrcjax.radar.modes import Modes, fresh_miss_ratio, fresh_miss_ratio_of, fresh_placement, room_for
 from jrcjax.radar.placement import Footprints
@@ -104,6 +105,11 @@ class _Described:
 
 @functools.lru_cache(_KNOWN_BANKS)
 def _known_bank(described: _Described) -> Array:
+    with jax.ensure_compile_time_eval():  # kept banks are numbers, also if a trace asks first
+        return jnp.asarray(kept("banks", described.content, lambda: _draw(described)))
+
+
+def _draw(described: _Described) -> Array:
     leaves, structure = jax.tree.flatten((described.modes, described.seed))
     shapes = tuple(jax.ShapeDtypeStruct(leaf.shape, leaf.dtype) for leaf in leaves)
     return _compiled(structure, shapes, described.size)(described.modes, described.seed)
@@ -111,7 +117,7 @@ def _known_bank(described: _Described) -> Array:
 
 @functools.cache
 def _compiled(structure: Any, shapes: tuple[jax.ShapeDtypeStruct, ...], size: int) -> Callable[[Modes, Array], Array]:
-    """`_build` ready to run: kept banks are numbers, also if a trace asks first."""
+    """`_build` ready to run, also while something is traced."""
     return _build.lower(*jax.tree.unflatten(structure, shapes), size).compile()
 
 

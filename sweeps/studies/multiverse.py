@@ -6,6 +6,7 @@ added, resumed, or sent to other machines.
 
 from __future__ import annotations
 
+import hashlib
 import itertools
 import json
 from collections.abc import Collection, Mapping, Sequence
@@ -92,8 +93,8 @@ def block_sweep(
     uniform = {path: path for path in fig9.PATHS.values() if path}
     sources = [{"reading": float(n)} | _source(of) for n, of in zip(numbers, values, strict=True)]
     name = f"{study}/{numbers[0]:06d}-{numbers[-1]:06d}"
-    if len(numbers) <= numbers[-1] - numbers[0]:
-        name += f"-{len(numbers)}"  # some of them
+    if len(numbers) <= numbers[-1] - numbers[0]:  # some of them, which others may start and end like
+        name += f"-{hashlib.sha256(repr(tuple(numbers)).encode()).hexdigest()[:8]}"
     source = Sweep(
         name=f"{name}-source",
         description="source agents of these readings",
@@ -135,22 +136,32 @@ def sweeps_of(
     asked: Collection[int] | None = None,
     figure: str | None = None,
 ) -> tuple[Sweep, ...]:
-    """The blocks of readings `first` to `first + number`: the first so many of each, or those of them asked for.
+    """The blocks of readings `first` to `first + number`: so many of each, or those of them asked for.
 
     Args:
       number: of readings.
       first: of the readings, the first of a block.
-      per_block: how many readings of each block.
+      per_block: how many readings of each block, see `some_of`.
       asked: the readings asked for; all if None.
       figure: whose points are run, with the target as it is; all if None.
     """
     values = {first + i: values_at(unit) for i, unit in enumerate(unit_of(number, first))}
-    blocks = [list(of)[:per_block] for _, of in itertools.groupby(values, lambda n: n // PER_BLOCK)]
+    blocks = [some_of(list(of), per_block) for _, of in itertools.groupby(values, lambda n: n // PER_BLOCK)]
     chosen = [[n for n in of if asked is None or n in asked] for of in blocks]
     name, points = "multiverse", tuple(range(len(POINTS)))
     if figure is not None:
         name, points = f"{name}/{figure}", points_of({figure})
     return tuple(block_sweep(name, of, [values[n] for n in of], points, _per_part(of, points)) for of in chosen if of)
+
+
+def some_of(block: Sequence[int], number: int) -> list[int]:
+    """So many readings of a block, ascending: a simple random sample that is always the same, and part of larger ones.
+
+    Readings at the same place of every block would have much in common: points of a Sobol' sequence whose numbers
+    differ by a multiple of a power of two agree in the leading digits of many coordinates.
+    """
+    order = np.random.default_rng(block[0] // PER_BLOCK).permutation(PER_BLOCK)
+    return sorted(sorted(block, key=lambda n: order[n % PER_BLOCK])[:number])
 
 
 def _per_part(readings: Sequence[int], points: Sequence[int]) -> int:

@@ -17,7 +17,7 @@ from sweeps.__main__ import main
 from sweeps.engine.job import Job
 from sweeps.preset import base_of
 from sweeps.results import store
-from sweeps.studies.multiverse import POINTS, SMOKE, sweeps_of
+from sweeps.studies.multiverse import POINTS, SMOKE, some_of, sweeps_of
 from sweeps.studies.readings import (
     PER_BLOCK,
     READINGS,
@@ -50,15 +50,25 @@ def test_a_reading_is_the_same_whatever_the_number_of_readings():
         f"multiverse/{a}" for a in ("000000-000063", "000064-000127", "000128-000135")
     ]
     assert sweeps_of(PER_BLOCK, first=PER_BLOCK) == blocks[1:2]
-    few = sweeps_of(2 * PER_BLOCK + 8, per_block=3)
-    assert [sweep.name for sweep in few] == [
-        f"multiverse/{a}" for a in ("000000-000002", "000064-000066", "000128-000130")
-    ]
+    for of_block, whole in zip(sweeps_of(2 * PER_BLOCK + 8, per_block=3), blocks, strict=True):
+        here = frame(whole).reading.isin(of_block.design.values("reading"))
+        assert here.sum() == 3 * len(POINTS)
+        part = frame(of_block)
+        pd.testing.assert_frame_equal(part, frame(whole).loc[here, part.columns].reset_index(drop=True))
     assert sweeps_of(PER_BLOCK + 1, per_block=3)[1] == sweeps_of(1, first=PER_BLOCK)[0]
-    for of_block, whole in zip(few, blocks, strict=True):
-        number = len(of_block.design.values("reading"))
-        assert number == 3 * len(POINTS)
-        pd.testing.assert_frame_equal(frame(of_block), frame(whole).iloc[:number])
+
+
+def test_some_readings_of_a_block_are_a_random_sample():
+    blocks = [range(first, first + PER_BLOCK) for first in range(0, 32 * PER_BLOCK, PER_BLOCK)]
+    few, more = ([some_of(block, number) for block in blocks] for number in (3, 6))
+    assert all(set(a) < set(b) <= set(block) for a, b, block in zip(few, more, blocks, strict=True))
+    assert all(some_of(block, PER_BLOCK) == list(block) for block in blocks)
+    places = np.array(more).ravel() % PER_BLOCK
+    assert len(np.unique(places)) > PER_BLOCK / 2  # at the same places all blocks would have the same leading digits
+    of_source = [reading.path for reading in READINGS].index(SOURCE)
+    units = unit_of(32 * PER_BLOCK)[np.ravel(more)]
+    correlated = np.corrcoef(units.T)[of_source]
+    assert np.abs(np.delete(correlated, of_source)).max() < 4 / np.sqrt(len(units))
 
 
 def test_readings_lie_in_their_ranges_and_each_level_is_tried_equally_often():
@@ -174,8 +184,9 @@ def test_only_readings_with_seeds_enough_have_a_part_in_shares_of_verdicts(made_
     assert (shares.undecided_low > 0.9).all()
     more = pd.read_csv(io.BytesIO(made_up("out", 2 * PER_BLOCK, seeds=9, keep=True, per_block=3)["verdicts.csv"]))
     assert more.reading.tolist() == list(range(2 * PER_BLOCK))
-    assert more.reading[more.n_seeds == 9].tolist() == [0, 1, 2, 64, 65, 66]
-    assert set(more.n_seeds[3:64]) == {5}
+    again = [n for block in (range(PER_BLOCK), range(PER_BLOCK, 2 * PER_BLOCK)) for n in some_of(block, 3)]
+    assert more.reading[more.n_seeds == 9].tolist() == again
+    assert set(more.n_seeds[:PER_BLOCK]) == {5, 9}
     alone = pd.read_csv(io.BytesIO(made_up("other", PER_BLOCK)["claims.csv"]))
     assert (alone.judged == 0).all()
     assert alone.supported.isna().all()
@@ -191,10 +202,11 @@ def test_more_seeds_go_where_a_claim_is_undecided(made_up, tmp_path, capsys):
     assert asked == [n for n in range(2 * PER_BLOCK) if n not in (0, 2, 3, 64)]
     assert figure == "fig5b"
     assert undecided(tmp_path / "out", claim, 5)[0] == []
-    sweeps = sweeps_of(2 * PER_BLOCK, per_block=5, asked=asked, figure=figure)
-    assert [sweep.name for sweep in sweeps] == [f"multiverse/fig5b/{a}" for a in ("000001-000004-2", "000065-000068")]
+    sweeps = sweeps_of(2 * PER_BLOCK, per_block=60, asked=asked, figure=figure)
+    sampled = [some_of(range(first, first + PER_BLOCK), 60) for first in (0, PER_BLOCK)]
     numbers = [sweep.design.values("reading").tolist() for sweep in sweeps]  # one point of each
-    assert numbers == [[1, 4], [65, 66, 67, 68]]
+    assert numbers == [[n for n in of if n not in (0, 2, 3, 64)] for of in sampled]
+    assert all(sweep.name.startswith("multiverse/fig5b/") for sweep in sweeps)
     with pytest.raises(ValueError, match=r"undecided: 'C99' is unknown; allowed: 'C3 \(TLwD\)'"):
         undecided(tmp_path / "out", "C99", 9)
     (tmp_path / "out" / "multiverse" / "summary" / "manifests.json").write_text(
