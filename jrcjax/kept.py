@@ -1,7 +1,8 @@
 """Numbers that take a second to make and are always the same, kept on disk beside the compiled programs.
 
 They are found by all that decides them: what they are made from, the source of this package, the versions of what it
-calls, JAX's settings, and the processor's instructions. Where no compiled programs are kept, nothing is.
+calls, JAX's settings, and the processor's instructions; their file names it, so that another file is not taken for it.
+Where no compiled programs are kept, nothing is.
 """
 
 from __future__ import annotations
@@ -18,8 +19,6 @@ import numpy as np
 
 from jrcjax import files, numerics, provenance
 
-_PACKAGE = Path(__file__).parent
-
 
 def kept(name: str, content: object, make: Callable[[], jax.Array]) -> np.ndarray:
     """What `make` gives, from disk if a process with the same code has made it before on such a machine.
@@ -32,25 +31,43 @@ def kept(name: str, content: object, make: Callable[[], jax.Array]) -> np.ndarra
       make: makes them.
     """
     folder = jax.config.jax_compilation_cache_dir  # pyright: ignore[reportAttributeAccessIssue]
-    if folder is None or "://" in folder:  # programs may be kept in a bucket
+    wanted = jax.config.jax_enable_compilation_cache  # pyright: ignore[reportAttributeAccessIssue]
+    if not wanted or folder is None or "://" in folder:  # programs may be kept in a bucket
         return np.asarray(make())
-    decides = repr((content, _code(), numerics.in_force(), jax.device_count() == 1))
-    path = Path(folder, name, f"{hashlib.sha256(decides.encode()).hexdigest()}.npy")
+    decides = repr((content, _code(), numerics.in_force(), _devices()))
+    key = hashlib.sha256(decides.encode()).digest()
+    path = Path(folder, name, f"{key.hex()}.npy")
     with contextlib.suppress(OSError, ValueError, files.DamagedFile):
-        return np.load(io.BytesIO(files.unsealed(path)), allow_pickle=False)
+        found = files.unsealed(path)
+        if found.startswith(key):
+            return np.load(io.BytesIO(found.removeprefix(key)), allow_pickle=False)
     made = np.asarray(make())
     with contextlib.suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
         written = io.BytesIO()
         np.save(written, made, allow_pickle=False)
-        files.write_whole(path, files.sealed(written.getvalue()))
+        files.write_whole(path, files.sealed(key + written.getvalue()))
     return made
+
+
+def _source_of(package: Path) -> str:
+    """A digest of a package's modules."""
+    source = hashlib.sha256()
+    for path in sorted(package.rglob("*.py")):
+        source.update(path.read_bytes())
+    return source.hexdigest()
+
+
+_SOURCE = _source_of(Path(__file__).parent)  # as it is imported, and not as it may be when something is made
 
 
 @functools.cache
 def _code() -> str:
     """What turns parameters into numbers: the source of this package, versions, and the machine."""
-    source = hashlib.sha256()
-    for path in sorted(_PACKAGE.rglob("*.py")):
-        source.update(path.read_bytes())
-    return repr((source.hexdigest(), provenance.versions(), provenance.machine(), jax.devices()[0].device_kind))
+    return repr((_SOURCE, provenance.versions(), provenance.machine()))
+
+
+def _devices() -> str:
+    """What computes: XLA compiles other code for a single CPU device."""
+    where = jax.config.jax_default_device or jax.devices()[0]  # pyright: ignore[reportAttributeAccessIssue]
+    return repr((str(where), getattr(where, "device_kind", ""), jax.device_count() == 1))

@@ -43,13 +43,21 @@ def huber_list(published: Path) -> str:
 
 
 def step_sizes_table(published: Path) -> str:
-    """One row per step size: when policies converge at p_1^v = 0.8, and where TLwD earns more than the others."""
+    """One row per step size, at p_1^v = 0.8: when policies converge, TLwD's leads, how often significant."""
     rows = []
     for rate, (here, leads) in _by_step_size(published).items():
-        cells = (f"{words.number(here.loc[n, 'median'])} ({percent(here.loc[n, 'reached'])})" for n in _LEARNERS)
-        rows.append((f"{rate:.3g}", *cells, *(f"{(leads[n].ci_low > 0).sum()} of {len(leads[n])}" for n in leads)))
-    head = (*(f"{LABELS[n]} converges in" for n in _LEARNERS), "TLwD earns more than DDQN", "than DPR")
+        cells = [f"{words.number(here.loc[n, 'median'])} ({percent(here.loc[n, 'reached'])})" for n in _LEARNERS]
+        cells += [_lead_at(leads[n]) for n in leads]
+        rows.append((f"{rate:.3g}", *cells))
+    head = (*(f"{LABELS[n]} converges in" for n in _LEARNERS), "TLwD's lead over DDQN", "over DPR")
     return table(("step size", *head), rows)
+
+
+def _lead_at(leads: pd.DataFrame) -> str:
+    """A lead at p_1^v = 0.8, and at how many values of p_1^v it is significant, on either side."""
+    (at,) = leads.loc[np.isclose(leads[_FAST], _AT)].to_dict("records")
+    more, less = (leads.ci_low > 0).sum(), (leads.ci_high < 0).sum()
+    return f"{at['lead']:.2f} ({at['ci_low']:.2f} to {at['ci_high']:.2f}); +{more} -{less} of {len(leads)}"
 
 
 def step_sizes_in_short(published: Path) -> str:
@@ -61,7 +69,8 @@ def step_sizes_in_short(published: Path) -> str:
     episodes = [(f"{rate:.3g}", float(here.loc["ddqn", "median"])) for rate, (here, _) in reversed(grid.items())]
     last = max((i for i, (_, episode) in enumerate(episodes) if np.isfinite(episode)), default=-1)
     when = [f"{words.number(episode)} with {rate}" for rate, episode in episodes[: last + 1]]
-    when += [f"never with {rate} or less" for rate, _ in episodes[last + 1 : last + 2]]
+    length = max(int(here.episodes.max()) for here, _ in grid.values())
+    when += [f"not within {length} with {rate} or less" for rate, _ in episodes[last + 1 : last + 2]]
     return (
         f"All else as by default, TLwD earns more than DDQN at every p_1^v with step sizes of {_or_none(ahead)}, less "
         f"at most of them with {_or_none(behind)}; DDQN converges at p_1^v = {_AT} (median) in episode "
@@ -86,12 +95,15 @@ def _by_step_size(published: Path) -> dict[float, tuple[pd.DataFrame, dict[str, 
 
 def _leads(between: pd.DataFrame) -> dict[str, pd.DataFrame]:
     """TLwD's lead in reward over each of the others at all values of p_1^v; tables hold the pair in either order."""
-    found = {}
-    for other in ("ddqn", "dpr"):
-        lead = between.loc[(between.algorithm == "tlwd") & (between.other == other), ["ci_low", "ci_high"]]
-        turned = between.loc[(between.algorithm == other) & (between.other == "tlwd")]
-        found[other] = pd.concat([lead, pd.DataFrame({"ci_low": -turned.ci_high, "ci_high": -turned.ci_low})])
-    return found
+    turned = between.assign(
+        algorithm=between.other,
+        other=between.algorithm,
+        mean=-between["mean"],
+        ci_low=-between.ci_high,
+        ci_high=-between.ci_low,
+    )
+    of_tlwd = pd.concat([between, turned]).query("algorithm == 'tlwd'").rename(columns={"mean": "lead"})
+    return {other: of_tlwd.loc[of_tlwd.other == other] for other in ("ddqn", "dpr")}
 
 
 BLOCKS: dict[str, Callable[[Path], str]] = {"huber": huber_list, "step_sizes": step_sizes_table}

@@ -19,8 +19,6 @@ from sweeps.studies.reconstruction import NAME
 
 FIGURES = "figures"
 """The published figures under the default readings."""
-NAMED = ("C3 (TLwD)", "C5 (highest)", "C8 (miss detection, DDQN)", "C13 (highest)")
-"""Statements that the first page names."""
 
 
 def csv_of(published: Path, study: str, name: str) -> pd.DataFrame:
@@ -42,8 +40,8 @@ def share_of(holds: pd.Series) -> str:
 
 
 def holds_in(published: Path, claim: str) -> pd.Series:
-    """Whether a statement's estimate is on its side, by number of the reading."""
-    found = csv_of(published, MULTIVERSE.name, "verdicts")
+    """Whether a statement's estimate of few seeds is on its side, by number of the reading."""
+    found = multiverse.estimates(csv_of(published, MULTIVERSE.name, "verdicts"))
     return found[found.claim == claim].set_index("reading").holds.astype(bool)
 
 

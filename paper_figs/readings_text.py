@@ -15,7 +15,7 @@ from paper_figs.claims.judge import VERDICTS
 from paper_figs.claims.results import Rules
 from paper_figs.markdown import listed, paragraph, percent, table
 from paper_figs.mechanisms_text import step_sizes_in_short
-from paper_figs.published import NAMED, csv_of, held, holds_in, of_multiverse, share, share_of, tried_in
+from paper_figs.published import csv_of, held, holds_in, of_multiverse, share, share_of, tried_in
 from paper_figs.studies import multiverse
 from sweeps.design import in_range
 from sweeps.preset import SOURCES
@@ -50,43 +50,66 @@ def readings_list(published: Path) -> str:
     """In which share of the readings the statements hold, and what decides, for the first page."""
     claims, sensitivity = (csv_of(published, MULTIVERSE.name, name) for name in ("claims", "sensitivity"))
     worthwhile, idle = of_multiverse(tried_in(published))
-    judged, by_name = int(claims.judged.max()), {row["claim"]: row for row in claims.to_dict("records")}
+    by_name = {row["claim"]: row for row in claims.to_dict("records") if row["claim"] in multiverse.HEADLINES}
+    judged = {int(row["judged"]) for row in by_name.values() if row["judged"]}
+    then = ("holds_then", "supported", "contradicted") if judged else ()
     rows = [
         (
             name,
             _holds(by_name[name]),
             held(published, worthwhile, name),
-            *([f"{percent(by_name[name][v])}" for v in ("supported", "contradicted")] if judged else []),
+            *(percent(by_name[name][share]) for share in then),
             _deciding_where(published, sensitivity, name),
         )
-        for name in NAMED
+        for name in multiverse.HEADLINES
     ]
-    of_verdicts = ("supported", "contradicted") if judged else ()
+    verdicts = csv_of(published, MULTIVERSE.name, "verdicts")
+    first, seeds = _seeds_of(multiverse.estimates(verdicts)), _seeds_of(multiverse.judged(verdicts))
+    of_verdicts = (f"with {seeds} seeds", "supported", "contradicted") if judged else ()
     head = ("statement", "on its side", "with a trade-off", *of_verdicts, "decided most by (most often with)")
-    of_judged = f"; of verdicts in {judged} with seeds enough ([all](docs/explanation/readings.md#verdicts))"
+    of_judged = (
+        f"; of {_from_to(judged)} drawn at random, with {seeds} seeds, and of their verdicts "
+        "([all](docs/explanation/readings.md#verdicts))"
+    )
     about = paragraph(
         f"Shares of {int(claims.readings.max())} readings ([tables](published/{MULTIVERSE.name})) in which the "
-        "estimate is on the statement's side, with 95 % intervals (unknown: no run converges); of the "
-        f"{len(worthwhile)} of {len(worthwhile) + len(idle)} in which no single action is optimal"
+        f"estimate (seeds: {first}) is on the statement's side, with 95 % intervals (unknown: no run converges); of "
+        f"the {len(worthwhile)} of {len(worthwhile) + len(idle)} in which no single action is optimal"
         + (of_judged if judged else "")
-        + "; and total-order indices of what decides it:"
+        + "; and what decides it: part of the variance that is predicted, total-order index:"
     )
     return f"{about}\n\n{table(head, rows)}\n\n{listed([_together(published), step_sizes_in_short(published)])}"
 
 
+def _seeds_of(verdicts: pd.DataFrame) -> str:
+    """How many seeds rows have: "5", "1 to 5"."""
+    return _from_to({int(n) for n in verdicts.n_seeds.dropna()})
+
+
+def _from_to(numbers: set[int]) -> str:
+    return " to ".join(str(n) for n in sorted({min(numbers), max(numbers)})) if numbers else "no"
+
+
 def _deciding_where(published: Path, sensitivity: pd.DataFrame, claim: str) -> str:
-    """The two questions that decide a statement most, each with the answer with which it holds most often."""
-    found = []
+    """How much is predicted, and the two questions that decide a statement most, each with its most favourable answer.
+
+    An answer is only named where its interval is above those of all others.
+    """
+    found, predicted = [], ""
     for row in _strongest(sensitivity, claim, 2).to_dict("records"):
         names, which, holds = _by_answer(published, claim, str(row["input"]))
-        most = max(range(len(names)), key=lambda i: holds[which == i].mean())
-        found.append(f"{row['input']} {row['total']:.2f} ({names[most]})")
-    return ", ".join(found) or "no single question"
+        parts = [holds.loc[which == i] for i in range(len(names))]
+        shares = [multiverse.share_of(part, part.index) for part in parts]
+        most = max(range(len(names)), key=lambda i: shares[i].low)
+        clear = all(shares[most].low > of.high for i, of in enumerate(shares) if i != most)
+        found.append(f"{row['input']} {row['total']:.2f}" + (f" ({names[most]})" if clear else ""))
+        predicted = f"{percent(1 - row['surrogate_error'])}: "
+    return predicted + ", ".join(found) if found else "no single question"
 
 
 def _by_answer(published: Path, claim: str, label: str) -> tuple[list[str], np.ndarray, pd.Series]:
     """Names of a question's answers; which of them each reading has; and whether a statement holds in it."""
-    holds = holds_in(published, claim).drop(0)  # the default is no point of the sample
+    holds = holds_in(published, claim).drop(0, errors="ignore")  # the default is no point of the sample
     (reading,) = (reading for reading in READINGS if reading.label == label)
     return *_answers(reading, _places_of(holds)[label].to_numpy()), holds
 
@@ -102,9 +125,12 @@ def never_judged_so(published: Path, claims: list[str]) -> str:
     shares = csv_of(published, MULTIVERSE.name, "claims").query("claim in @claims and judged > 0 and supported == 0")
     if shares.empty:
         return "Each of these is supported in some of the multiverse's readings with verdicts."
+    seeds = _seeds_of(multiverse.judged(csv_of(published, MULTIVERSE.name, "verdicts")))
     return (
-        f"Of these, supported in none of the {int(shares.judged.max())} readings of the multiverse with verdicts "
-        f"either, so in at most {percent(shares.supported_high.max())} of the space: {'; '.join(shares.claim)}."
+        f"Of these, {seeds} seeds support none in the {_from_to(set(shares.judged.astype(int)))} readings of the "
+        f"multiverse with verdicts, so they would in at most {percent(shares.supported_high.max())} of readings (each "
+        f"by itself); but {percent(shares.undecided.mean())} of these verdicts are undecided: "
+        f"{'; '.join(shares.claim)}."
     )
 
 
@@ -118,13 +144,28 @@ def judged_table(published: Path) -> str:
     return table(("statement", *names), rows)
 
 
+def looks_table(published: Path) -> str:
+    """The statements of the first page in the readings with seeds enough for verdicts: few seeds, and all of them."""
+    found = multiverse.sampled(csv_of(published, MULTIVERSE.name, "verdicts"))
+    then, rows = multiverse.judged(found), []
+    first = multiverse.estimates(found)
+    for claim in multiverse.HEADLINES:
+        few, many = (of.loc[of.claim == claim].set_index("reading").holds.astype(bool) for of in (first, then))
+        if many.empty:
+            continue
+        few = few.loc[many.index]
+        cells = (f"{holds.sum()} of {len(holds)}" for holds in (few, many))
+        rows.append((claim, *cells, str((many & ~few).sum()), str((few & ~many).sum())))
+    head = ("statement", *(f"on its side, seeds: {_seeds_of(of)}" for of in (first, then)), "came to it", "left it")
+    return table(head, rows)
+
+
 def judged_list(published: Path) -> str:
     """What has a verdict, and what verdicts say in most readings."""
     claims, verdicts = (csv_of(published, MULTIVERSE.name, name) for name in ("claims", "verdicts"))
-    judged = verdicts[verdicts.n_seeds >= Rules().least_seeds]
+    judged = multiverse.judged(multiverse.sampled(verdicts))
     if judged.empty:
         return listed([f"No reading has seeds enough for a verdict, which takes {Rules().least_seeds}."])
-    seeds = ", ".join(f"{count} of {n:.0f} seeds" for n, count in judged.n_seeds.value_counts().sort_index().items())
     mostly = {v: claims.claim[claims[f"{v}_low"] > 0.5] for v in ("supported", "contradicted")}
     never = claims.claim[claims.supported == 0]
     in_words = [
@@ -132,8 +173,8 @@ def judged_list(published: Path) -> str:
     ]
     return listed(
         [
-            f"{judged.reading.nunique()} of {verdicts.reading.nunique()} readings have seeds enough for {len(judged)} "
-            f"verdicts ({seeds}): " + ", ".join(f"{(judged.verdict == v).sum()} {v}" for v in VERDICTS) + ".",
+            f"{judged.reading.nunique()} of {verdicts.reading.nunique()} readings have {_seeds_of(judged)} seeds, and "
+            f"{len(judged)} verdicts: " + ", ".join(f"{(judged.verdict == v).sum()} {v}" for v in VERDICTS) + ".",
             *in_words,
             f"Supported in none of them: {'; '.join(never) or 'none'}.",
         ]
@@ -176,9 +217,22 @@ def _together(published: Path) -> str:
     )
 
 
+def pair_table(published: Path) -> str:
+    """Where the statements of the first page hold, by the loss in the target and what the source was trained with."""
+    rows, labels = [], {reading.path: reading.label for reading in READINGS}
+    losses, sources = ([str(as_text(path, i)) for i in range(2)] for path in ("hparams.loss", SOURCE))
+    for claim in multiverse.HEADLINES:
+        holds = holds_in(published, claim).drop(0, errors="ignore")
+        loss, source = (_places_of(holds)[labels[path]].to_numpy() for path in ("hparams.loss", SOURCE))
+        rows.append((claim, *(share_of(holds.loc[(loss == i) & (source == j)]) for i in range(2) for j in range(2))))
+    return table(("statement", *(f"{loss}, {source}" for loss in losses for source in sources)), rows)
+
+
 def decided_table(published: Path) -> str:
-    """One row per statement: where it holds, and what decides it."""
-    claims, sensitivity = (csv_of(published, MULTIVERSE.name, name) for name in ("claims", "sensitivity"))
+    """One row per statement: where it holds, what decides it, and what decides whether it has an effect at all."""
+    claims, sensitivity, known = (
+        csv_of(published, MULTIVERSE.name, name) for name in ("claims", "sensitivity", "known")
+    )
     error = sensitivity.drop_duplicates("claim").set_index("claim").surrogate_error
     rows = [
         (
@@ -186,21 +240,38 @@ def decided_table(published: Path) -> str:
             _holds(row),
             _deciding(sensitivity, row["claim"]),
             f"{error[row['claim']]:.2f}" if row["claim"] in error.index else "",
+            _deciding(known, row["claim"], 2) if row["claim"] in set(known.claim) else "",
         )
         for row in claims.to_dict("records")
     ]
-    return table(("statement", "holds in (95 % interval)", "decided by (total-order index)", "error"), rows)
+    head = ("statement", "holds in (95 % interval)", "decided by (total-order index)", "error", "known or not by")
+    return table(head, rows)
 
 
 def answers_table(published: Path) -> str:
     """Where the statements of the first page hold, by the answers to the two questions that decide each most."""
     sensitivity, rows = csv_of(published, MULTIVERSE.name, "sensitivity"), []
-    for claim in NAMED:
+    for claim in multiverse.HEADLINES:
         for label in _strongest(sensitivity, claim, 2)["input"]:
             names, which, holds = _by_answer(published, claim, label)
             cells = [f"{name}: {share_of(holds.loc[which == i])}" for i, name in enumerate(names)]
             rows.append((claim, label, "; ".join(cells)))
     return table(("statement", "question", "holds in (95 % interval), by answer"), rows)
+
+
+def outcomes_table(published: Path) -> str:
+    """One row per question: in which share of readings the statements of the first page hold, by answer."""
+    rows = []
+    for reading in READINGS:
+        cells = []
+        for claim in multiverse.HEADLINES:
+            names, which, holds = _by_answer(published, claim, reading.label)
+            shares = (
+                f"{name} {percent(holds[which == i].mean())}" for i, name in enumerate(names) if (which == i).any()
+            )
+            cells.append("; ".join(shares))
+        rows.append((f"`{reading.path}`", *cells))
+    return table(("field", *multiverse.HEADLINES), rows)
 
 
 def _answers(reading: Reading, places: np.ndarray) -> tuple[list[str], np.ndarray]:
@@ -227,16 +298,19 @@ def questions_table(published: Path) -> str:
     sensitivity, default = csv_of(published, MULTIVERSE.name, "sensitivity"), values_at(default_unit())
     rows = []
     for reading in READINGS:
-        of_question = sensitivity.query("input == @reading.label and surrogate_error < @_BLIND")
+        asked = "input == @reading.label and surrogate_error < @_BLIND and total_low > @_DECIDING"
+        of_question = sensitivity.query(asked)
         predicted = (of_question.total * (1.0 - of_question.surrogate_error)).nlargest(1).index
         decides = "".join(
-            f"{most['claim']}: {most['total']:.2f} ({most['total_low']:.2f} to {most['total_high']:.2f})"
+            f"{most['claim']}: {most['total']:.2f} ({most['total_low']:.2f} to {most['total_high']:.2f}) "
+            f"of {percent(1.0 - most['surrogate_error'])}"
             for _, most in of_question.loc[predicted].iterrows()
         )
         value = as_text(reading.path, default[reading.path])
         of_default = value if isinstance(value, str) else f"{value:g}"
         rows.append((f"`{reading.path}`", reading.label, of_default, _searched(reading), decides))
-    return table(("field", "question", "default", "searched", "decides most (total-order index)"), rows)
+    head = ("field", "question", "default", "searched", "decides most (total-order index, of what is predicted)")
+    return table(head, rows)
 
 
 BLOCKS: dict[str, Callable[[Path], str]] = {
@@ -245,7 +319,10 @@ BLOCKS: dict[str, Callable[[Path], str]] = {
     "decided": decided_table,
     "judged": judged_list,
     "judged_table": judged_table,
+    "looks": looks_table,
+    "outcomes": outcomes_table,
     "questions": questions_table,
     "answers": answers_table,
+    "pair": pair_table,
 }
 """Name of a marked part to what makes it from the folder of published results."""

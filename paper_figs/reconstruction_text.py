@@ -16,7 +16,6 @@ from paper_figs.claims.table import number_of
 from paper_figs.markdown import listed, percent, table
 from paper_figs.published import (
     FIGURES,
-    NAMED,
     best_for,
     confirmed_in,
     counted,
@@ -104,17 +103,18 @@ def search_list(published: Path) -> str:
     """How far the best reading goes, what there is to learn in it, and what holds in none, for the first page."""
     tried, confirmed, closest = _tables(published)
     best, rarest = best_for(confirmed, ALL), closest.nsmallest(1, "holds").to_dict("records")[0]
-    headlines = best[best.claim.isin(NAMED)].groupby("verdict", sort=False).claim.agg(", ".join)
+    headlines = best[best.claim.isin(multiverse.HEADLINES)].groupby("verdict", sort=False).claim.agg(", ".join)
+    in_words = "; ".join(f"{claims} {verdict}" for verdict, claims in headlines.items())
     sentences = [
-        f"Of {len(tried)} readings, {_searched(tried)} of them from a search, {named(best.reading.iloc[0])} fits the "
-        f"text best: of {len(best)} statements {counted(best)} by {int(best.n_seeds.max())} fresh seeds "
-        f"([all]({_PAGE})), with {'; '.join(f'{claims} {verdict}' for verdict, claims in headlines.items())}.",
+        f"Of {len(tried)} readings, {_searched(tried)} of them from a search, {named(best.reading.iloc[0])} agreed "
+        f"most with the text in its single seed: of {len(best)} statements {counted(best)} by "
+        f"{int(best.n_seeds.max())} fresh seeds ([all]({_PAGE})), with {in_words}.",
         f"{_world_in_short(published)} {trade_off_in_short(published)} "
         + (
             _nowhere(tried, closest)
             or f"Each statement's estimate holds in some reading, {rarest['claim']}'s in {rarest['holds']}."
         )
-        + f" Fresh seeds support {len(_supported(confirmed))} of {len(closest)} in some.",
+        + f" Fresh seeds support {len(_supported(confirmed))} of {len(closest)} in some, [the rest]({_PAGE}) in none.",
     ]
     return listed(sentences)
 

@@ -11,7 +11,6 @@ import pandas as pd
 
 from paper_figs.markdown import listed, percent
 from paper_figs.published import (
-    NAMED,
     best_for,
     confirmed_in,
     counted,
@@ -54,7 +53,9 @@ def trade_off_list(published: Path) -> str:
         f"Answers with which no reading has a trade-off: {fields}. Of the {sum(left)} readings without them {left[0]} "
         "have one.",
         "On their side in readings with a trade-off, and in those without one: "
-        + "; ".join(f"{c} in {held(published, worthwhile, c)} and {held(published, idle, c)}" for c in NAMED)
+        + "; ".join(
+            f"{c} in {held(published, worthwhile, c)} and {held(published, idle, c)}" for c in multiverse.HEADLINES
+        )
         + ".",
         _best_with_trade_off(tried, best_for(confirmed, TRADE_OFF)),
     ]
@@ -103,17 +104,21 @@ def _imitated(values: Mapping[Hashable, Any], default: Mapping[Hashable, Any]) -
 
 
 def trade_off_in_short(published: Path) -> str:
-    """How many readings have a trade-off, and which of these fits the text best."""
+    """How many readings have a trade-off, and which of these agrees most with the text."""
     tried = tried_in(published)
     (worthwhile, idle), best = of_multiverse(tried), best_for(confirmed_in(published), TRADE_OFF)
     if worthwhile.empty:
         return "No reading of the multiverse has a trade-off in the target."
-    share, claim, fresh = len(worthwhile) / (len(worthwhile) + len(idle)), NAMED[0], "fresh seeds to come"
+    share, claim, fresh = (
+        len(worthwhile) / (len(worthwhile) + len(idle)),
+        multiverse.HEADLINES[0],
+        "fresh seeds to come",
+    )
     if not best.empty:
         fresh = f"{counted(best)}; {claim} {', '.join(best.verdict[best.claim == claim]) or 'unknown'}"
     return (
         f"{percent(share)} of the multiverse have [a trade-off]({_PAGE}) in the target, of which "
-        f"{named(with_trade_off(tried))} fits best ({fresh})."
+        f"{named(with_trade_off(tried))} agreed most ({fresh})."
     )
 
 

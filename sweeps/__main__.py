@@ -66,7 +66,7 @@ class Run:
     code: a random sample, always the same; with few, more seeds go to readings from everywhere in the space."""
     keep: bool = False
     """Of the multiverse, keep what the summary in OUT/multiverse/summary, which an earlier run wrote, says of other
-    readings."""
+    readings, and of the same ones with other numbers of seeds."""
     undecided: Annotated[str | None, tyro.conf.arg(metavar="CLAIM")] = None
     """Of the multiverse, with --keep: only readings that the summary has no verdict of this claim for, such as
     "C5 (highest)", and fewer seeds than --seeds, at the points of the claim's figure alone."""

@@ -56,15 +56,33 @@ def test_other_code_and_other_settings_make_them_anew(folder, change, monkeypatc
     assert len(calls) == 2
 
 
-def test_the_source_of_the_package_is_part_of_what_decides(folder, monkeypatch, tmp_path):
-    package = tmp_path / "package"
-    package.mkdir()
-    (package / "draw.py").write_text("one = 1\n")
-    monkeypatch.setattr(module, "_PACKAGE", package)
-    one = module._code.__wrapped__()
-    assert one == module._code.__wrapped__()
-    (package / "draw.py").write_text("one = 2\n")
-    assert one != module._code.__wrapped__()
+def test_the_source_of_the_package_is_part_of_what_decides(tmp_path):
+    (tmp_path / "draw.py").write_text("one = 1\n")
+    one = module._source_of(tmp_path)
+    assert one == module._source_of(tmp_path)
+    (tmp_path / "draw.py").write_text("one = 2\n")
+    assert one != module._source_of(tmp_path)
+    assert module._SOURCE in module._code()
+
+
+def test_a_whole_file_of_other_numbers_is_not_taken(folder):
+    calls = []
+    kept("numbers", "a", made(calls))
+    (first,) = (folder / "numbers").iterdir()
+    kept("numbers", "b", made(calls))
+    (second,) = {*(folder / "numbers").iterdir()} - {first}
+    first.write_bytes(second.read_bytes())
+    kept("numbers", "a", made(calls))
+    assert len(calls) == 3
+
+
+def test_who_keeps_no_programs_keeps_nothing_else(folder):
+    jax.config.update("jax_enable_compilation_cache", False)
+    try:
+        kept("numbers", "a", made([]))
+    finally:
+        jax.config.update("jax_enable_compilation_cache", True)
+    assert not folder.exists()
 
 
 @pytest.mark.parametrize("damage", ["flipped", "cut", "empty", "folder", "array"])

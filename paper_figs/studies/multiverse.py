@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from jrcjax.checks import refuse
 from jrcjax.types import choice
 from paper_figs.analysis.intervals import Interval, clustered_share
-from paper_figs.analysis.sensitivity import LEAST_POINTS, sensitivity
+from paper_figs.analysis.sensitivity import LEAST_POINTS, Sensitivity, sensitivity
 from paper_figs.claims.effects import learners_of, metric_of
 from paper_figs.claims.judge import UNDECIDED, VERDICTS, Claim, Judgement, is_on_its_side
 from paper_figs.claims.results import Rules
@@ -24,6 +24,8 @@ from sweeps.studies.multiverse import points_of, verdicts_file
 from sweeps.studies.readings import PER_BLOCK, READINGS, SOURCE, Reading, range_of, unit_of, values_at
 
 FIGURES = ("fig5b", "fig6", "fig7", "fig8", "fig9")
+_RARE = 0.1  # share of readings with an effect, or without, below which it is not asked why
+_ROW = ["reading", "claim", "n_seeds"]  # what tells the rows of a table of verdicts apart
 
 
 def claims_in(source: xr.Dataset, target: xr.Dataset) -> list[Judgement]:
@@ -70,12 +72,29 @@ def verdicts(judged: list[tuple[int, list[Judgement]]]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def with_more_seeds(known: pd.DataFrame, found: pd.DataFrame) -> pd.DataFrame:
-    """The verdicts of both, see `verdicts`; of a claim in a reading that of more seeds, or else the one just found."""
+def together(known: pd.DataFrame, found: pd.DataFrame) -> pd.DataFrame:
+    """The verdicts of both, see `verdicts`, in order: of a reading, claim and number of seeds what was just found."""
     place = {claim.claim: place for place, claim in enumerate(CLAIMS)}
-    both = pd.concat([known, found])
-    both = both.iloc[np.lexsort((both.n_seeds, both.claim.map(place), both.reading))]
-    return both.drop_duplicates(["reading", "claim"], keep="last")
+    both = pd.concat([known, found]).drop_duplicates(_ROW, keep="last")
+    return both.iloc[np.lexsort((both.n_seeds, both.claim.map(place), both.reading))]
+
+
+def estimates(found: pd.DataFrame) -> pd.DataFrame:
+    """One row per reading and claim, that of the fewest seeds, which all readings have.
+
+    Estimates of few seeds and of many don't mix: the least of several differences, for one, is the lower the fewer.
+    """
+    return found.drop_duplicates(_ROW[:2])
+
+
+def judged(found: pd.DataFrame) -> pd.DataFrame:
+    """One row per reading and claim with seeds enough for a verdict, that of the most seeds."""
+    return found.loc[found.n_seeds >= Rules().least_seeds].drop_duplicates(_ROW[:2], keep="last")
+
+
+def sampled(found: pd.DataFrame) -> pd.DataFrame:
+    """The rows of all readings but 0, which is the default and no point of the sample."""
+    return found.loc[found.reading > 0]
 
 
 def undecided(out: Path, claim: str, seeds: int) -> tuple[list[int], str]:
@@ -93,7 +112,8 @@ def undecided(out: Path, claim: str, seeds: int) -> tuple[list[int], str]:
     found = pd.read_csv(path)
     figures = {c.claim: c.sweep for c in CLAIMS if c.claim in set(found.claim)}
     choice("undecided", claim, tuple(figures))
-    asked = found[(found.claim == claim) & (found.verdict == UNDECIDED) & (found.n_seeds < seeds)]
+    of_claim = found.loc[found.claim == claim].drop_duplicates("reading", keep="last")
+    asked = of_claim.loc[(of_claim.verdict == UNDECIDED) & (of_claim.n_seeds < seeds)]
     return asked.reading.tolist(), figures[claim]
 
 
@@ -110,16 +130,18 @@ def share_of(holds: pd.Series, readings: pd.Series | pd.Index) -> Interval:
 def shares(found: pd.DataFrame) -> pd.DataFrame:
     """One row per claim: the share of readings where it holds; of those with seeds enough, that of each verdict.
 
-    A claim is `unknown` where it has no effect, as where no run that it compares ever converges.
+    A claim is `unknown` where it has no effect, as where no run that it compares ever converges. `holds` and `unknown`
+    are of `estimates`, all else of what is `judged`: `holds_then` of the same estimates with more seeds.
     The limits are of 95 %, for readings that come in blocks; `readings` and `judged` count what the shares are of.
     """
     rows = []
-    for claim, of_claim in found.groupby("claim", sort=False):
-        judged = of_claim[of_claim.n_seeds >= Rules().least_seeds]
-        row: dict[str, object] = {"claim": claim, "readings": len(of_claim), "judged": len(judged)}
-        found_in = {"holds": (of_claim, of_claim.holds.astype(bool)), "unknown": (of_claim, of_claim.value.isna())}
-        found_in |= {verdict: (judged, judged.verdict == verdict) for verdict in VERDICTS}
-        found_in["negligible"] = judged, judged.negligible == True  # noqa: E712
+    for claim, of_claim in sampled(found).groupby("claim", sort=False):
+        first, then = estimates(of_claim), judged(of_claim)
+        row: dict[str, object] = {"claim": claim, "readings": len(first), "judged": len(then)}
+        found_in = {"holds": (first, first.holds.astype(bool)), "unknown": (first, first.value.isna())}
+        found_in |= {verdict: (then, then.verdict == verdict) for verdict in VERDICTS}
+        found_in["negligible"] = then, then.negligible == True  # noqa: E712
+        found_in["holds_then"] = then, then.holds.astype(bool)
         for name, (of, holds) in found_in.items():
             share = share_of(holds, of.reading) if len(of) else (np.nan,) * 3
             row |= dict(zip((name, f"{name}_low", f"{name}_high"), map(float, share), strict=True))
@@ -132,17 +154,17 @@ def readings(numbers: list[int]) -> pd.DataFrame:
     return pd.DataFrame([{"reading": n} | values_at(unit_of(1, n)[0]) for n in numbers])
 
 
-HEADLINES = ("C3 (TLwD)", "C5 (highest)", "C8 (miss detection, DDQN)")
-"""Statements whose specification curves are drawn."""
+HEADLINES = ("C3 (TLwD)", "C5 (highest)", "C8 (miss detection, DDQN)", "C13 (highest)")
+"""Statements that the first page names, and whose specification curves are drawn."""
 
 
 def specification(found: pd.DataFrame, sensitivity: pd.DataFrame) -> Figure:
-    """Specification curves of the paper's headlines, with the questions that decide each most."""
+    """Specification curves of the paper's headlines, from estimates, with the questions that decide each most."""
     most = sensitivity.sort_values("total", ascending=False)
     decisive = {claim: most.input[most.claim == claim].tolist() for claim in HEADLINES}
     limits = {c.claim: float(c.limit) for c in CLAIMS if decisive.get(c.claim) and isinstance(c.limit, float)}
     inputs = places(int(found.reading.max()) + 1)
-    return plot.draw_specification(found.query("reading > 0"), inputs / inputs.max(), decisive, limits)
+    return plot.draw_specification(sampled(estimates(found)), inputs / inputs.max(), decisive, limits)
 
 
 def places(number: int) -> pd.DataFrame:
@@ -168,29 +190,41 @@ def decisive(found: pd.DataFrame, episodes: int) -> dict[str, pd.DataFrame]:
     """Sensitivity indices of each claim's effect over the readings, and interactions of its three strongest ones.
 
     Only questions that can act on a claim are asked, see `can_act`. What never converges counts as the last episode.
+    Indices are over the readings in which there is an effect; where that is not nearly all or none, `known` has the
+    indices of whether there is one, since who is left depends on the answers.
 
     Args:
       found: see `verdicts`.
       episodes: length of the runs.
     """
-    sampled = found.query("reading > 0")  # reading 0 is the default and no point of the sample
-    never = np.isposinf(sampled.value) & sampled.claim.isin([c.claim for c in CLAIMS if c.unit == "episode"])
-    sampled = sampled.assign(value=sampled.value.mask(never, episodes))
-    sampled = sampled[np.isfinite(sampled.value.to_numpy(float))]
+    rows = sampled(estimates(found))
+    never = np.isposinf(rows.value) & rows.claim.isin([c.claim for c in CLAIMS if c.unit == "episode"])
+    rows = rows.assign(value=rows.value.mask(never, episodes))
     inputs = places(int(found.reading.max()) + 1)
-    of_claims = ((claim, sampled[sampled.claim == claim.claim]) for claim in CLAIMS)
-    enough = [(claim, of_claim, inputs) for claim, of_claim in of_claims if len(of_claim) >= LEAST_POINTS]
-    tables = on_cores(_decisive, enough)
-    return {name: pd.concat(t[name] for t in tables) for name in ("sensitivity", "interactions")} if enough else {}
+    of_claims = ((claim, rows[rows.claim == claim.claim], inputs) for claim in CLAIMS)
+    tables = on_cores(_decisive, of_claims)
+    names = dict.fromkeys(name for of_claim in tables for name in of_claim)
+    return {name: pd.concat(of_claim[name] for of_claim in tables if name in of_claim) for name in names}
 
 
-def _decisive(claim: Claim, of_claim: pd.DataFrame, inputs: pd.DataFrame) -> dict[str, pd.DataFrame]:
-    """`decisive` of one claim."""
-    numbers = of_claim.reading.to_numpy(int)
+def _decisive(claim: Claim, rows: pd.DataFrame, inputs: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """`decisive` of one claim, as far as there are readings enough."""
     asked = [reading.label for reading in READINGS if can_act(reading, claim)]
-    indices = sensitivity(inputs.loc[numbers, asked], of_claim.value.to_numpy(float), blocks=numbers // PER_BLOCK)
-    about = {"claim": claim.claim, "readings": len(numbers), "surrogate": indices.surrogate}
-    return {
-        "sensitivity": indices.table.assign(**about, surrogate_error=indices.error),
-        "interactions": indices.pairs.assign(claim=claim.claim),
-    }
+
+    def indices_of(readings: pd.Series, output: np.ndarray) -> Sensitivity:
+        numbers = readings.to_numpy(int)
+        return sensitivity(inputs.loc[numbers, asked], output, blocks=numbers // PER_BLOCK)
+
+    def described(indices: Sensitivity, number: int) -> pd.DataFrame:
+        about = {"claim": claim.claim, "readings": number, "surrogate": indices.surrogate}
+        return indices.table.assign(**about, surrogate_error=indices.error)
+
+    values, tables = rows.value.to_numpy(float), {}
+    is_known = np.isfinite(values)
+    if is_known.sum() >= LEAST_POINTS:
+        of_effect = indices_of(rows.reading[is_known], values[is_known])
+        tables["sensitivity"] = described(of_effect, int(is_known.sum()))
+        tables["interactions"] = of_effect.pairs.assign(claim=claim.claim)
+    if len(rows) >= LEAST_POINTS and _RARE <= is_known.mean() <= 1 - _RARE:
+        tables["known"] = described(indices_of(rows.reading, is_known.astype(float)), len(rows))
+    return tables

@@ -89,12 +89,13 @@ def search(effort: Effort, size: Size, out: Path, run: Callable[..., Path]) -> l
         found += generation
     tried = known + found
     lost = lost_by_one_action([one.unit for one in tried])
-    chosen, fresh = choice_of(tried, lost), of_seeds(size, size.seeds + effort.confirm)
+    used = max(size.seeds, *(int(one.verdicts.n_seeds.max()) for one in tried))
+    chosen, fresh = choice_of(tried, lost), of_seeds(size, used + effort.confirm)
     tables = {"tried": tried_table(tried, lost), "closest": closest_table(tried)}
     confirmed, written = [], []
     for choice in chosen:
         sweep = confirmation_sweep(choice.reading.unit, choice.figures)
-        confirmed += _kept(sweep, fresh, out, run, first_seed=size.seeds)
+        confirmed += _kept(sweep, fresh, out, run, first_seed=used)
         # Each reading takes long, so the summary says what is confirmed so far.
         tables["confirmed"] = confirmed_table(chosen[: len(confirmed)], confirmed)
         written = _write(out / NAME / "summary", tables, chosen[0].reading)
@@ -155,7 +156,7 @@ def _of_multiverse(out: Path) -> list[Tried]:
     path = verdicts_file(out)
     if not path.is_file():
         return []
-    readings = pd.read_csv(path, keep_default_na=True).groupby("reading")
+    readings = multiverse.estimates(pd.read_csv(path, keep_default_na=True)).groupby("reading")
     return [
         Tried(f"multiverse {n}" if n else DEFAULT, unit_of(1, int(n))[0] if n else default_unit(), of)  # pyright: ignore
         for n, of in readings

@@ -49,14 +49,14 @@ def summarise_multiverse(sweeps: tuple[Sweep, ...], size: Size, out: Path, keep:
       sweeps: the blocks of readings that were run.
       size: of the runs.
       out: the folder of all results.
-      keep: whether what the summary says of other readings, or of these from more seeds, is kept.
+      keep: whether what the summary says of other readings, or of these from other numbers of seeds, is kept.
     """
     path = verdicts_file(out)
     folder = path.parent
     folder.mkdir(parents=True, exist_ok=True)
     found = pd.concat(on_cores(_of_block, ((sweep, size, out) for sweep in sweeps)))
     if keep:
-        found = multiverse.with_more_seeds(pd.read_csv(path), found)
+        found = multiverse.together(pd.read_csv(path), found)
     style.save_table(found, path)
     found = pd.read_csv(path)  # so that conclusions are the same whether readings came from this run or an earlier one
     tables = {

@@ -3,11 +3,11 @@
 import json
 import math
 
+import numpy as np
 import pandas as pd
 import pytest
 
 from paper_figs import mechanisms_text, publish, readings_text, readme, reconstruction_text, trade_off_text
-from paper_figs.published import NAMED
 from paper_figs.studies import multiverse
 from sweeps.preset import preset_of
 from sweeps.studies.readings import READINGS, SOURCE, unit_of, values_at
@@ -21,28 +21,38 @@ def multiverse_tables():
     def share(claim, holds):
         limits = {"holds": holds, "holds_low": max(holds - 0.05, 0.0), "holds_high": min(holds + 0.05, 1.0)}
         limits["unknown"] = 0.3 if claim.startswith("C3") else 0.0
-        for name, of in {"supported": 0.0, "contradicted": 0.75, "undecided": 0.25, "negligible": 0.0}.items():
+        for name, of in {
+            "supported": 0.0,
+            "contradicted": 0.75,
+            "undecided": 0.25,
+            "negligible": 0.0,
+            "holds_then": 0.6,
+        }.items():
             limits |= {name: of, f"{name}_low": of - 0.1, f"{name}_high": of + 0.1}
         return {"claim": claim, "readings": 400, "judged": 2} | limits
 
-    claims = [share(claim, 0.5) for claim in NAMED] + [share("C2 (everywhere)", 0.99), share("C4", 0.01)]
+    claims = [share(claim, 0.5) for claim in multiverse.HEADLINES] + [share("C2 (everywhere)", 0.99), share("C4", 0.01)]
     index = {"first": 0.1, "first_low": 0.0, "first_high": 0.2, "surrogate": "gaussian", "surrogate_error": 0.25}
     sensitivity = [
         {"claim": "C3 (TLwD)", "input": STEP, "total": 0.8, "total_low": 0.7, "total_high": 0.9} | index,
         {"claim": "C3 (TLwD)", "input": MARGIN, "total": 0.2, "total_low": 0.01, "total_high": 0.3} | index,
     ]
     steps = multiverse.places(41)[STEP]
-    verdicts = [{"reading": n, "claim": "C3 (TLwD)", "holds": bool(steps[n] < 1 / 3)} for n in range(41)]
+    verdicts = [{"reading": n, "claim": "C3 (TLwD)", "holds": bool(steps[n] < 1 / 3), "n_seeds": 1} for n in range(41)]
+    verdicts += [{"reading": n, "claim": "C4", "holds": False, "n_seeds": 1} for n in (7, 9, 11)]
     verdicts += [
-        {"reading": n, "claim": "C4", "holds": False, "verdict": verdict, "n_seeds": 5}
+        {"reading": n, "claim": claim, "holds": n == 9, "verdict": verdict, "n_seeds": 5}
         for n, verdict in ((7, "contradicted"), (9, "contradicted"), (11, "undecided"))
+        for claim in ("C3 (TLwD)", "C4")
     ]
     verdicts += [
-        {"reading": n, "claim": claim, "holds": of.get("hparams.loss") == of.get(SOURCE) == 1}
+        {"reading": n, "claim": claim, "holds": of.get("hparams.loss") == of.get(SOURCE) == 1, "n_seeds": 1}
         for claim in readings_text.TOGETHER
         for n, of in enumerate(map(values_at, unit_of(41)))
     ]
-    return {"multiverse/verdicts": verdicts, "multiverse/claims": claims, "multiverse/sensitivity": sensitivity}
+    known = [sensitivity[0] | {"input": MARGIN, "total": 0.6}]
+    tables = {"verdicts": verdicts, "claims": claims, "sensitivity": sensitivity, "known": known}
+    return {f"multiverse/{name}": rows for name, rows in tables.items()}
 
 
 def search_tables():
@@ -93,13 +103,13 @@ def sweep_tables():
     rate, fast = "hparams.learning_rate", "env.speed.event_probability.high"
     points = [(step, p) for step in (1e-5, 1e-3) for p in (0.4, 0.8)]
     converged = [
-        {rate: step, fast: p, "algorithm": name, "reached": reached, "median": median}
+        {rate: step, fast: p, "algorithm": name, "reached": reached, "median": median, "episodes": 450}
         for step, p in points
         for name, reached, median in (("ddqn", 0.3, math.inf), ("dpr", 1.0, 12.0), ("tlwd", 0.8, 100 * p))
     ]
     pairs = [("ddqn", "dpr", 0.0), ("ddqn", "tlwd", -1.0), ("dpr", "tlwd", 1.0)]
     between = [
-        {"panel": panel, "algorithm": a, "other": b, rate: step, fast: p}
+        {"panel": panel, "algorithm": a, "other": b, rate: step, fast: p, "mean": lead}
         | {"ci_low": lead - 0.1 - (p == 0.8), "ci_high": lead + 0.1 + (step == 1e-3) * p * 1.2}
         for step, p in points
         for panel in "ab"
@@ -137,10 +147,10 @@ def test_shares_and_what_decides_are_those_of_the_tables(published):
     text = " ".join(readings_text.readings_list(published).split())
     assert "Shares of 400 readings" in text
     # Of the readings in the fixture's multiverse the default alone has a trade-off, and C3 does not hold in it.
-    assert "in which the estimate is on the statement's side" in text
+    assert "in which the estimate (seeds: 1) is on the statement's side" in text
     assert "of the 1 of 2 in which no single action is optimal" in text
-    step = f"{STEP} 0.80 (1e-06 to 2.2e-05)"
-    assert f"| C3 (TLwD) | 50 % (45 to 55), unknown in 30 % | 0 % (0 to 95) | 0 % | 75 % | {step} |" in text
+    step = f"75 %: {STEP} 0.80 (1e-06 to 2.2e-05)"
+    assert f"| C3 (TLwD) | 50 % (45 to 55), unknown in 30 % | 0 % (0 to 95) | 60 % | 0 % | 75 % | {step} |" in text
     assert "| C5 (highest) | 50 % (45 to 55) | " in text
     assert "| no single question |" in text
     text = " ".join(readings_text.extremes_list(published).split())
@@ -151,7 +161,7 @@ def test_shares_and_what_decides_are_those_of_the_tables(published):
 def test_what_has_a_verdict_and_what_verdicts_say(published):
     text = readings_text.judged_list(published)
     assert " ".join(text.split()).startswith(
-        "- 3 of 41 readings have seeds enough for 3 verdicts (3 of 5 seeds): 0 supported, 2 contradicted, 1 undecided."
+        "- 3 of 41 readings have 5 seeds, and 6 verdicts: 0 supported, 4 contradicted, 2 undecided."
     )
     everything = "; ".join(pd.read_csv(published / "multiverse" / "claims.csv").claim)
     assert (
@@ -163,8 +173,37 @@ def test_what_has_a_verdict_and_what_verdicts_say(published):
         readings_text.judged_table(published)
     )
     first_page = " ".join(readings_text.readings_list(published).split())
-    assert "of verdicts in 2 with seeds enough ([all](docs/explanation/readings.md#verdicts))" in first_page
-    assert "| on its side | with a trade-off | supported | contradicted |" in first_page
+    assert "of 2 drawn at random, with 5 seeds, and of their verdicts ([all](docs/" in first_page
+    assert "| on its side | with a trade-off | with 5 seeds | supported | contradicted |" in first_page
+
+
+def test_estimates_of_few_and_of_many_seeds_stand_beside_each_other(published):
+    few = pd.read_csv(published / "multiverse" / "verdicts.csv").query("claim == 'C3 (TLwD)' and n_seeds == 1")
+    few = few.set_index("reading").holds.loc[[7, 9, 11]]
+    head, _, row, *others = readings_text.looks_table(published).splitlines()
+    assert head == "| statement | on its side, seeds: 1 | on its side, seeds: 5 | came to it | left it |"
+    assert not few.loc[9]
+    assert row == f"| C3 (TLwD) | {few.sum()} of 3 | 1 of 3 | 1 | {few.sum()} |"
+    assert not others  # no verdicts
+
+
+def test_an_answer_is_named_only_where_it_clearly_holds_more_often(published):
+    path = published / "multiverse" / "verdicts.csv"
+    rng, table = np.random.default_rng(1), pd.read_csv(path)
+    of_c3 = table.claim == "C3 (TLwD)"
+    table.loc[of_c3, "holds"] = rng.random(of_c3.sum()) < 0.5
+    table.to_csv(path, index=False)
+    text = " ".join(readings_text.readings_list(published).split())
+    assert f"| 75 %: {STEP} 0.80 |" in text
+
+
+def test_what_came_out_by_answer_stands_in_one_table(published):
+    rows = readings_text.outcomes_table(published).splitlines()[2:]
+    assert [row.split("|")[1].strip().strip("`") for row in rows] == [reading.path for reading in READINGS]
+    (step,) = (row for row in rows if "hparams.learning_rate" in row)
+    assert "1e-06 to 2.2e-05 100 %; 2.2e-05 to 0.00046 0 %; 0.00046 to 0.01 0 % |" in step
+    (loss,) = (row for row in rows if "hparams.loss" in row)
+    assert "squared 0 %; huber" in loss
 
 
 def test_readings_of_a_single_seed_have_no_verdicts(published):
@@ -173,7 +212,9 @@ def test_readings_of_a_single_seed_have_no_verdicts(published):
         table = pd.read_csv(file)
         for column in ("supported", "supported_low", "contradicted", "contradicted_low"):
             table[column] = math.nan
-        table.assign(judged=0, n_seeds=1).to_csv(file, index=False)
+        table.assign(judged=0, n_seeds=1).drop_duplicates(["claim", *table.filter(["reading"])]).to_csv(
+            file, index=False
+        )
     assert "verdict" not in readings_text.readings_list(published)
     assert readings_text.judged_list(published).startswith("- No reading has seeds enough for a verdict")
     assert readings_text.judged_table(published).count("\n") == 1
@@ -184,12 +225,22 @@ def test_what_two_questions_decide_together_is_told_apart(published):
     assert "and in all others, C5 (highest) holds in 100 % and 0 % (with a trade-off: " in text
 
 
+def test_two_questions_that_decide_together_have_a_table(published):
+    head, _, *rows = readings_text.pair_table(published).splitlines()
+    assert head == "| statement | squared, same | squared, table1 | huber, same | huber, table1 |"
+    (row,) = (row for row in rows if "C5 (highest)" in row)
+    shares = [cell.split("(")[0].strip() for cell in row.split("|")[2:6]]
+    assert shares == ["0 %", "0 %", "0 %", "100 %"]
+
+
 def test_every_question_stands_in_one_table_by_field(published):
     rows = readings_text.questions_table(published).splitlines()[2:]
     assert [row.split("|")[1].strip().strip("`") for row in rows] == [reading.path for reading in READINGS]
     step = next(row for row in rows if "hparams.learning_rate" in row)
     assert "1e-06 to 0.01, logarithmic" in step
-    assert "C3 (TLwD): 0.80 (0.70 to 0.90)" in step
+    assert "C3 (TLwD): 0.80 (0.70 to 0.90) of 75 %" in step
+    margin = next(row for row in rows if "`hparams.margin`" in row)
+    assert margin.endswith("|  |")  # its interval holds next to nothing
     optimiser = next(row for row in rows if "config.optimiser" in row)
     assert "adam" in optimiser
     assert "sgd" in optimiser
@@ -197,8 +248,8 @@ def test_every_question_stands_in_one_table_by_field(published):
 
 def test_every_statement_has_what_decides_it(published):
     rows = readings_text.decided_table(published).splitlines()[2:]
-    assert len(rows) == len(NAMED) + 2
-    assert f"| C3 (TLwD) | 50 % (45 to 55), unknown in 30 % | {STEP} 0.80 | 0.25 |" in rows
+    assert len(rows) == len(multiverse.HEADLINES) + 2
+    assert f"| C3 (TLwD) | 50 % (45 to 55), unknown in 30 % | {STEP} 0.80 | 0.25 | {MARGIN} 0.60 |" in rows
 
 
 def test_a_statement_holds_by_the_answers_that_decide_it(published):
@@ -224,11 +275,13 @@ def test_promise_and_confirmation_stand_side_by_side(published):
     assert "fresh seeds in the other readings support: C5 (highest)." in text
     assert "in none of the 4 readings, so in at most 77.6 % of the space: C11." in text
     assert "in none of those that were run with them: C4; C7 (TLwD); C7 (DPR); C7 (DDQN)." in text
-    assert (
-        "in none of the 2 readings of the multiverse with verdicts either, so in at most 10 % of the space: C4." in text
-    )
+    assert "5 seeds support none in the 2 readings of the multiverse with verdicts, so they would in at most 10" in text
+    assert "(each by itself); but 25 % of these verdicts are undecided: C4." in text
     first_page = " ".join(reconstruction_text.search_list(published).split())
-    assert "Of 4 readings, 2 of them from a search, reading 0 of the search fits the text best:" in first_page
+    assert (
+        "Of 4 readings, 2 of them from a search, reading 0 of the search agreed most with the text in its single seed:"
+        in first_page
+    )
     assert "of 7 statements 1 supported, 5 contradicted, 1 undecided by 100 fresh seeds ([all](docs/" in first_page
     assert "with C3 (TLwD) supported; C5 (highest) contradicted." in first_page
     assert "in none of the 4 readings, so in at most 77.6 % of the space: C11." in first_page  # 1 - 0.05 ** (1 / 2)
@@ -279,7 +332,9 @@ def test_an_agent_that_imitates_is_said_to(published):
 def test_the_first_page_says_how_many_readings_have_a_trade_off(published):
     text = " ".join(reconstruction_text.search_list(published).split())
     assert "loses up to 25 % in it at the points of Figs. 6 to 8 (default: it loses up to 25 %). 50 % of the" in text
-    assert "where-there-is-a-trade-off) in the target, of which reading 1 of the search fits best (1 supported," in text
+    assert (
+        "where-there-is-a-trade-off) in the target, of which reading 1 of the search agreed most (1 supported," in text
+    )
     assert "1 contradicted, 0 undecided; C3 (TLwD) unknown)." in text
 
 
@@ -295,7 +350,8 @@ def test_a_world_where_each_statement_holds_somewhere(published):
     pd.read_csv(path).assign(holds=[3, 1, 2, 4, 4, 4, 4]).to_csv(path, index=False)
     first_page = " ".join(reconstruction_text.search_list(published).split())
     assert first_page.endswith(
-        "Each statement's estimate holds in some reading, C4's in 1. Fresh seeds support 2 of 7 in some."
+        "Each statement's estimate holds in some reading, C4's in 1. Fresh seeds support 2 of 7 in some, "
+        "[the rest](docs/explanation/readings.md#the-best-reading) in none."
     )
     text = " ".join(reconstruction_text.best_list(published).split())
     assert "Each statement's estimate is on its side in some of the 4 readings." in text
@@ -333,14 +389,16 @@ def test_what_the_loss_does_is_what_the_table_holds(published):
 def test_what_the_step_size_does_is_what_the_tables_hold(published):
     rows = mechanisms_text.step_sizes_table(published).splitlines()[2:]
     assert rows == [
-        "| 1e-05 | never (30 %) | 12 (100 %) | 80 (80 %) | 2 of 2 | 0 of 2 |",
-        "| 0.001 | never (30 %) | 12 (100 %) | 80 (80 %) | 1 of 2 | 0 of 2 |",
+        "| 1e-05 | never (30 %) | 12 (100 %) | 80 (80 %) | 1.00 (0.90 to 2.10); +2 -0 of 2 | "
+        "-1.00 (-1.10 to 0.10); +0 -1 of 2 |",
+        "| 0.001 | never (30 %) | 12 (100 %) | 80 (80 %) | 1.00 (-0.06 to 2.10); +1 -0 of 2 | "
+        "-1.00 (-2.06 to 0.10); +0 -1 of 2 |",
     ]
     first_page = " ".join(readings_text.readings_list(published).split())
     assert (
         "with step sizes of 1e-05, less at most of them with none; DDQN converges at p_1^v = 0.8 (median)" in first_page
     )
-    assert "in episode never with 0.001 or less ([why]" in first_page
+    assert "in episode not within 450 with 0.001 or less ([why]" in first_page
 
 
 def test_a_sweep_is_published_without_its_parts(published, tmp_path):

@@ -58,7 +58,24 @@ def test_what_never_changes_is_decided_by_nothing_and_few_points_by_no_one():
 
 def of_claim(claim, values):
     """Verdicts of one claim in as many readings of the multiverse as there are values."""
-    return pd.DataFrame({"reading": np.arange(len(values)), "claim": claim, "value": values})
+    return pd.DataFrame({"reading": np.arange(len(values)), "claim": claim, "n_seeds": 1, "value": values})
+
+
+def test_who_is_left_out_is_told_beside_what_decides():
+    places = multiverse.places(257)
+    step, values = places["step size (SGD: a hundredth)"], places["weight of the margin"].to_numpy(float).copy()
+    values[np.where(places["loss"] == 1, step > 0.2, step > 0.9)] = np.nan  # nobody converges, mostly with one answer
+    with joblib.parallel_config(backend="sequential"):
+        tables = multiverse.decisive(of_claim("C5 (highest)", values), 450)
+    effect, known = (tables[name].set_index("input") for name in ("sensitivity", "known"))
+    assert (effect.readings == np.isfinite(values[1:]).sum()).all()
+    assert (known.readings == 256).all()
+    assert effect.total["weight of the margin"] > 0.9
+    assert effect.drop("weight of the margin").total_low.max() < 0.05
+    # p = P(known) is 0.9 and 0.2 with even odds: Var E(known | loss) = 0.35^2 of Var = 0.55 * 0.45.
+    assert known.first_low["loss"] <= 0.35**2 / (0.55 * 0.45) <= known.first_high["loss"]
+    assert known.total_low["weight of the margin"] < 0.05
+    assert known.total.nlargest(2).index.tolist() == ["loss", "step size (SGD: a hundredth)"]
 
 
 def test_what_decides_in_a_multiverse_with_known_answers():

@@ -12,7 +12,7 @@ import pytest
 import jrcjax
 from jrcjax.config.paths import number_at, parameter_at
 from paper_figs.studies import summaries
-from paper_figs.studies.multiverse import undecided, with_more_seeds
+from paper_figs.studies.multiverse import estimates, judged, together, undecided
 from sweeps.__main__ import main
 from sweeps.engine.job import Job
 from sweeps.preset import base_of
@@ -228,19 +228,36 @@ def test_the_points_of_a_figure_are_those_of_the_whole_reading():
     pd.testing.assert_frame_equal(frame(part.source), frame(whole.source).iloc[[1]].reset_index(drop=True))
 
 
-def test_a_verdict_of_fewer_seeds_does_not_take_the_place_of_one_of_more():
+def test_verdicts_of_different_numbers_of_seeds_stand_beside_each_other():
     def table(n_seeds, *readings, claims=("C1 (reached)", "C3 (TLwD)")):
-        rows = [
-            {"reading": n, "claim": claim, "n_seeds": n_seeds, "value": n_seeds} for n in readings for claim in claims
-        ]
+        rows = [{"reading": n, "claim": c, "n_seeds": n_seeds, "value": n_seeds} for n in readings for c in claims]
         return pd.DataFrame(rows)
 
-    known = pd.concat([table(2, 0, 1), table(20, 2, claims=["C3 (TLwD)"]), table(5, 2, claims=["C1 (reached)"])])
-    both = with_more_seeds(known, table(10, 2, 1)).set_index(["reading", "claim"])
-    assert both.index.tolist() == [(n, claim) for n in range(3) for claim in ("C1 (reached)", "C3 (TLwD)")]
-    assert both.n_seeds.tolist() == [2, 2, 10, 10, 10, 20]
-    again = with_more_seeds(both.reset_index(), table(10, 1).assign(value=0.5))
-    assert again[again.reading == 1].value.tolist() == [0.5, 0.5]
+    known = pd.concat([table(2, 0, 1, 2), table(20, 2, claims=["C3 (TLwD)"])])
+    both = together(known, pd.concat([table(10, 2, 1), table(2, 0).assign(value=0.5)]))
+    assert both.drop(columns="value").values.tolist() == [
+        [0, "C1 (reached)", 2],
+        [0, "C3 (TLwD)", 2],
+        [1, "C1 (reached)", 2],
+        [1, "C1 (reached)", 10],
+        [1, "C3 (TLwD)", 2],
+        [1, "C3 (TLwD)", 10],
+        [2, "C1 (reached)", 2],
+        [2, "C1 (reached)", 10],
+        [2, "C3 (TLwD)", 2],
+        [2, "C3 (TLwD)", 10],
+        [2, "C3 (TLwD)", 20],
+    ]
+    assert both.value[:2].tolist() == [0.5, 0.5]  # found anew
+    both = both.reset_index(drop=True)
+    assert set(estimates(both).n_seeds) == {2}
+    assert len(estimates(both)) == 6
+    assert judged(both)[["reading", "claim", "n_seeds"]].values.tolist() == [
+        [1, "C1 (reached)", 10],
+        [1, "C3 (TLwD)", 10],
+        [2, "C1 (reached)", 10],
+        [2, "C3 (TLwD)", 20],
+    ]
 
 
 @pytest.mark.parametrize(
