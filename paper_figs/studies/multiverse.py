@@ -100,6 +100,8 @@ def sampled(found: pd.DataFrame) -> pd.DataFrame:
 def undecided(out: Path, claim: str, seeds: int) -> tuple[list[int], str]:
     """Readings that the summary in `out` has no verdict of a claim for, and fewer seeds than these.
 
+    A difference that is known to be negligible needs no more of them.
+
     Returns:
       The readings, and the figure whose points the claim is about.
 
@@ -113,7 +115,8 @@ def undecided(out: Path, claim: str, seeds: int) -> tuple[list[int], str]:
     figures = {c.claim: c.sweep for c in CLAIMS if c.claim in set(found.claim)}
     choice("undecided", claim, tuple(figures))
     of_claim = found.loc[found.claim == claim].drop_duplicates("reading", keep="last")
-    asked = of_claim.loc[(of_claim.verdict == UNDECIDED) & (of_claim.n_seeds < seeds)]
+    is_open = (of_claim.verdict == UNDECIDED) & of_claim.negligible.ne(True)
+    asked = of_claim.loc[is_open & (of_claim.n_seeds < seeds)]
     return asked.reading.tolist(), figures[claim]
 
 

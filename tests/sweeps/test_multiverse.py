@@ -197,15 +197,16 @@ def test_more_seeds_go_where_a_claim_is_undecided(made_up, tmp_path, capsys):
     path = tmp_path / "out" / "multiverse" / "summary" / "verdicts.csv"
     claim, found = "C3 (TLwD)", pd.read_csv(path)
     decided = found.reading.isin([0, 2, 3, 64])
-    found.assign(verdict=np.where(decided, "supported", "undecided"), n_seeds=5).to_csv(path, index=False)
+    of_five = {"verdict": np.where(decided, "supported", "undecided"), "n_seeds": 5}
+    found.assign(**of_five, negligible=np.where(found.reading == 7, "True", "")).to_csv(path, index=False)
     asked, figure = undecided(tmp_path / "out", claim, 9)
-    assert asked == [n for n in range(2 * PER_BLOCK) if n not in (0, 2, 3, 64)]
+    assert asked == [n for n in range(2 * PER_BLOCK) if n not in (0, 2, 3, 7, 64)]
     assert figure == "fig5b"
     assert undecided(tmp_path / "out", claim, 5)[0] == []
     sweeps = sweeps_of(2 * PER_BLOCK, per_block=60, asked=asked, figure=figure)
     sampled = [some_of(range(first, first + PER_BLOCK), 60) for first in (0, PER_BLOCK)]
     numbers = [sweep.design.values("reading").tolist() for sweep in sweeps]  # one point of each
-    assert numbers == [[n for n in of if n not in (0, 2, 3, 64)] for of in sampled]
+    assert numbers == [[n for n in of if n in asked] for of in sampled]
     assert all(sweep.name.startswith("multiverse/fig5b/") for sweep in sweeps)
     with pytest.raises(ValueError, match=r"undecided: 'C99' is unknown; allowed: 'C3 \(TLwD\)'"):
         undecided(tmp_path / "out", "C99", 9)
