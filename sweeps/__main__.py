@@ -22,6 +22,7 @@ from sweeps.studies.custom import CUSTOM, Options, custom_sweep
 from sweeps.sweep import Study, size_of
 
 _UNDECIDED = "paper_figs.studies.multiverse:undecided"
+_FINISHED = "paper_figs.studies.multiverse:finished"
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,8 @@ class Run:
     code: a random sample, always the same; with few, more seeds go to readings from everywhere in the space."""
     keep: bool = False
     """Of the multiverse, keep what the summary in OUT/multiverse/summary, which an earlier run wrote, says of other
-    readings, and of the same ones with other numbers of seeds."""
+    readings, and of the same ones with other numbers of seeds; what it has of these with so many seeds is not run
+    again."""
     undecided: Annotated[str | None, tyro.conf.arg(metavar="CLAIM")] = None
     """Of the multiverse, with --keep: only readings that the summary has no verdict of this claim for, such as
     "C5 (highest)", and fewer seeds than --seeds, at the points of the claim's figure alone."""
@@ -117,7 +119,6 @@ def _run(command: Command) -> int:
     console = begin()
     from jrcjax.types import choice
     from sweeps.engine.run import run_sweep
-    from sweeps.studies import multiverse
     from sweeps.studies.reconstruction import effort_of
 
     if isinstance(command, Verify):
@@ -127,8 +128,6 @@ def _run(command: Command) -> int:
     study = _study(command, preset)
     size = size_of(command.seeds, command.episodes, preset, command.smoke, study)
     size.check()
-    if command.keep:
-        multiverse.require_summary(command.out, size)
     sweeps = study.smoke_sweeps if command.smoke and study.smoke_sweeps else study.sweeps
     require_integer("wait", command.wait, 0)
     options = {"resume": command.resume, "save_agents": command.save_agents, "patience": command.wait}
@@ -176,19 +175,24 @@ def _study(command: Run, preset: str) -> Study:
 
 
 def _multiverse(command: Run) -> Study:
+    """The readings asked for: all, or with --keep those that the summary does not have, or is undecided about."""
     from sweeps.studies import multiverse
 
     which = command.readings, command.smoke, command.first, command.per_block
-    if command.undecided is None:
-        return multiverse.study_of(*which)
     if not command.keep:
-        refuse("keep", False, "True beside --undecided, which adds seeds to what a summary says of other readings")
-    seeds = size_of(command.seeds, command.episodes, "paper", command.smoke, multiverse.MULTIVERSE).seeds
-    study = multiverse.study_of(*which, *_found(_UNDECIDED)(command.out, command.undecided, seeds))
+        if command.undecided is not None:
+            refuse("keep", False, "True beside --undecided, which adds seeds to what a summary says of other readings")
+        return multiverse.study_of(*which)
+    size = size_of(command.seeds, command.episodes, "paper", command.smoke, multiverse.MULTIVERSE)
+    if command.undecided is None:
+        multiverse.require_summary(command.out, size)
+        return multiverse.study_of(*which, without=_found(_FINISHED)(command.out, size.seeds))
+    asked, figure = _found(_UNDECIDED)(command.out, command.undecided, size.seeds)
+    multiverse.require_summary(command.out, size)
+    study = multiverse.study_of(*which, asked=asked, figure=figure)
     if not study.sweeps:
-        refuse(
-            "undecided", command.undecided, f"a claim with undecided readings of fewer than {seeds} seeds among these"
-        )
+        allowed = f"a claim with undecided readings of fewer than {size.seeds} seeds among these"
+        refuse("undecided", command.undecided, allowed)
     return study
 
 

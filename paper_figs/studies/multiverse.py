@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -72,11 +72,11 @@ def verdicts(judged: list[tuple[int, list[Judgement]]]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def together(known: pd.DataFrame, found: pd.DataFrame) -> pd.DataFrame:
-    """The verdicts of both, see `verdicts`, in order: of a reading, claim and number of seeds what was just found."""
+def together(tables: Iterable[pd.DataFrame]) -> pd.DataFrame:
+    """Tables of verdicts as one, in order; of a reading, claim and number of seeds what the last table says."""
     place = {claim.claim: place for place, claim in enumerate(CLAIMS)}
-    both = pd.concat([known, found]).drop_duplicates(_ROW, keep="last")
-    return both.iloc[np.lexsort((both.n_seeds, both.claim.map(place), both.reading))]
+    rows = pd.concat(tables).drop_duplicates(_ROW, keep="last")
+    return rows.iloc[np.lexsort((rows.n_seeds, rows.claim.map(place), rows.reading))]
 
 
 def estimates(found: pd.DataFrame) -> pd.DataFrame:
@@ -118,6 +118,13 @@ def undecided(out: Path, claim: str, seeds: int) -> tuple[list[int], str]:
     is_open = (of_claim.verdict == UNDECIDED) & of_claim.negligible.ne(True)
     asked = of_claim.loc[is_open & (of_claim.n_seeds < seeds)]
     return asked.reading.tolist(), figures[claim]
+
+
+def finished(out: Path, seeds: int) -> set[int]:
+    """Readings of which the summary in `out` has all claims with so many seeds."""
+    found = pd.read_csv(verdicts_file(out))
+    claims = found.loc[found.n_seeds == seeds].groupby("reading").claim.nunique()
+    return set(claims.index[claims == found.claim.nunique()])
 
 
 def agreement(of_reading: pd.DataFrame) -> pd.Series:

@@ -54,9 +54,8 @@ def summarise_multiverse(sweeps: tuple[Sweep, ...], size: Size, out: Path, keep:
     path = verdicts_file(out)
     folder = path.parent
     folder.mkdir(parents=True, exist_ok=True)
-    found = pd.concat(on_cores(_of_block, ((sweep, size, out) for sweep in sweeps)))
-    if keep:
-        found = multiverse.together(pd.read_csv(path), found)
+    known = [pd.read_csv(path)] if keep else []
+    found = multiverse.together([*known, *on_cores(_of_block, ((sweep, size, out) for sweep in sweeps))])
     style.save_table(found, path)
     found = pd.read_csv(path)  # so that conclusions are the same whether readings came from this run or an earlier one
     tables = {

@@ -134,6 +134,7 @@ def sweeps_of(
     first: int = 0,
     per_block: int = PER_BLOCK,
     asked: Collection[int] | None = None,
+    without: Collection[int] = (),
     figure: str | None = None,
 ) -> tuple[Sweep, ...]:
     """The blocks of readings `first` to `first + number`: so many of each, or those of them asked for.
@@ -143,11 +144,12 @@ def sweeps_of(
       first: of the readings, the first of a block.
       per_block: how many readings of each block, see `some_of`.
       asked: the readings asked for; all if None.
+      without: readings to leave out.
       figure: whose points are run, with the target as it is; all if None.
     """
     values = {first + i: values_at(unit) for i, unit in enumerate(unit_of(number, first))}
     blocks = [some_of(list(of), per_block) for _, of in itertools.groupby(values, lambda n: n // PER_BLOCK)]
-    chosen = [[n for n in of if asked is None or n in asked] for of in blocks]
+    chosen = [[n for n in of if (asked is None or n in asked) and n not in without] for of in blocks]
     name, points = "multiverse", tuple(range(len(POINTS)))
     if figure is not None:
         name, points = f"{name}/{figure}", points_of({figure})
@@ -186,6 +188,7 @@ def study_of(
     first: int = 0,
     per_block: int = PER_BLOCK,
     asked: Collection[int] | None = None,
+    without: Collection[int] = (),
     figure: str | None = None,
 ) -> Study:
     """The study of the readings from `first` on, up to so many in all; for the rest see `sweeps_of`.
@@ -199,7 +202,7 @@ def study_of(
     if first not in range(0, number, PER_BLOCK):
         refuse("first", first, f"a multiple of {PER_BLOCK} from 0 on, less than readings = {number}")
     require_integer("per_block", per_block, 1, PER_BLOCK)
-    return MULTIVERSE.with_sweeps(sweeps_of(number - first, first, per_block, asked, figure))
+    return MULTIVERSE.with_sweeps(sweeps_of(number - first, first, per_block, asked, without, figure))
 
 
 def verdicts_file(out: Path) -> Path:

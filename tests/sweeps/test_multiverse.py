@@ -12,7 +12,7 @@ import pytest
 import jrcjax
 from jrcjax.config.paths import number_at, parameter_at
 from paper_figs.studies import summaries
-from paper_figs.studies.multiverse import estimates, judged, together, undecided
+from paper_figs.studies.multiverse import estimates, finished, judged, together, undecided
 from sweeps.__main__ import main
 from sweeps.engine.job import Job
 from sweeps.preset import base_of
@@ -128,8 +128,11 @@ def test_a_tiny_multiverse_judges_all_claims_in_each_reading(tmp_path):
     found = pd.read_csv(summary / "verdicts.csv")
     assert set(found.reading) == {0, 1}
     assert {claim.split()[0] for claim in found.claim} == {f"C{number}" for number in range(1, 16)}
-    assert (pd.read_csv(summary / "claims.csv").readings == 2).all()
+    assert (pd.read_csv(summary / "claims.csv").readings == 1).all()  # the default is none of the sample
     assert main([*run, "--resume"]) == 0
+    before = (summary / "verdicts.csv").read_bytes()
+    assert main([*run, "--keep"]) == 0  # nothing left to run
+    assert (summary / "verdicts.csv").read_bytes() == before
 
 
 @pytest.fixture
@@ -178,15 +181,15 @@ def test_only_readings_with_seeds_enough_have_a_part_in_shares_of_verdicts(made_
     made_up("out", 2 * PER_BLOCK)
     files = made_up("out", PER_BLOCK, seeds=5, keep=True)
     shares = pd.read_csv(io.BytesIO(files["claims.csv"]))
-    assert set(shares.readings) == {2 * PER_BLOCK}
-    assert set(shares.judged) == {PER_BLOCK}
+    assert set(shares.readings) == {2 * PER_BLOCK - 1}  # the default is none of the sample
+    assert set(shares.judged) == {PER_BLOCK - 1}
     np.testing.assert_allclose(shares.undecided, 1.0)
     assert (shares.undecided_low > 0.9).all()
     more = pd.read_csv(io.BytesIO(made_up("out", 2 * PER_BLOCK, seeds=9, keep=True, per_block=3)["verdicts.csv"]))
-    assert more.reading.tolist() == list(range(2 * PER_BLOCK))
+    assert more.reading[more.n_seeds == 1].tolist() == list(range(2 * PER_BLOCK))
     again = [n for block in (range(PER_BLOCK), range(PER_BLOCK, 2 * PER_BLOCK)) for n in some_of(block, 3)]
     assert more.reading[more.n_seeds == 9].tolist() == again
-    assert set(more.n_seeds[:PER_BLOCK]) == {5, 9}
+    assert more.n_seeds.value_counts().to_dict() == {1: 2 * PER_BLOCK, 5: PER_BLOCK, 9: 6}
     alone = pd.read_csv(io.BytesIO(made_up("other", PER_BLOCK)["claims.csv"]))
     assert (alone.judged == 0).all()
     assert alone.supported.isna().all()
@@ -218,6 +221,25 @@ def test_more_seeds_go_where_a_claim_is_undecided(made_up, tmp_path, capsys):
     assert "a claim with undecided readings of fewer than 5 seeds among these" in capsys.readouterr().err
 
 
+def test_what_a_summary_has_with_so_many_seeds_is_not_run_again(made_up, tmp_path):
+    made_up("out", 2 * PER_BLOCK)
+    made_up("out", 2 * PER_BLOCK, seeds=6, keep=True, per_block=3)
+    blocks = range(PER_BLOCK), range(PER_BLOCK, 2 * PER_BLOCK)
+    few, more = (([some_of(block, number) for block in blocks]) for number in (3, 5))
+    done = finished(tmp_path / "out", 6)
+    assert done == {n for of in few for n in of}
+    assert finished(tmp_path / "out", 1) == set(range(2 * PER_BLOCK))
+    assert finished(tmp_path / "out", 7) == set()
+    new = [sweep.source.design.values("reading") for sweep in sweeps_of(2 * PER_BLOCK, per_block=5, without=done)]
+    assert [set(of) for of in new] == [set(b) - set(a) for a, b in zip(few, more, strict=True)]
+    # With nothing left to run the summary is made anew, of what it has.
+    before = (tmp_path / "out" / "multiverse" / "summary" / "verdicts.csv").read_bytes()
+    out = tmp_path / "out"
+    with joblib.parallel_config(backend="sequential"):
+        summaries.summarise_multiverse((), Size(seeds=6), out, keep=True)
+    assert (out / "multiverse" / "summary" / "verdicts.csv").read_bytes() == before
+
+
 def test_the_points_of_a_figure_are_those_of_the_whole_reading():
     (whole,), (part,) = sweeps_of(2), sweeps_of(2, asked=[1], figure="fig6")
     expected = frame(whole).query("reading == 1 and point_of_reading < 4").reset_index(drop=True)
@@ -235,7 +257,7 @@ def test_verdicts_of_different_numbers_of_seeds_stand_beside_each_other():
         return pd.DataFrame(rows)
 
     known = pd.concat([table(2, 0, 1, 2), table(20, 2, claims=["C3 (TLwD)"])])
-    both = together(known, pd.concat([table(10, 2, 1), table(2, 0).assign(value=0.5)]))
+    both = together([known, table(10, 2, 1), table(2, 0).assign(value=0.5)])
     assert both.drop(columns="value").values.tolist() == [
         [0, "C1 (reached)", 2],
         [0, "C3 (TLwD)", 2],
