@@ -68,15 +68,14 @@ def readings_list(published: Path) -> str:
     of_verdicts = (f"with {seeds} seeds", "supported", "contradicted") if judged else ()
     head = ("statement", "on its side", "with a trade-off", *of_verdicts, "decided most by (most often with)")
     of_judged = (
-        f"; of {_from_to(judged)} drawn at random, with {seeds} seeds, and of their verdicts "
-        "([all](docs/explanation/readings.md#verdicts))"
+        f"; of {_from_to(judged)} at random with {seeds} seeds ([verdicts](docs/explanation/readings.md#verdicts))"
     )
     about = paragraph(
-        f"Shares of {int(claims.readings.max())} readings ([tables](published/{MULTIVERSE.name})) in which the "
-        f"estimate (seeds: {first}) is on the statement's side, with 95 % intervals (unknown: no run converges); of "
-        f"the {len(worthwhile)} of {len(worthwhile) + len(idle)} in which no single action is optimal"
+        f"Shares of {int(claims.readings.max())} readings ([tables](published/{MULTIVERSE.name})) whose estimate "
+        f"(seeds: {first}) is on the statement's side, with 95 % intervals (unknown: no run converges); of the "
+        f"{len(worthwhile)} of {len(worthwhile) + len(idle)} in which no single action is optimal"
         + (of_judged if judged else "")
-        + "; and what decides it: part of the variance that is predicted, total-order index:"
+        + "; and what decides it, of what is predicted:"
     )
     return f"{about}\n\n{table(head, rows)}\n\n{listed([_together(published), step_sizes_in_short(published)])}"
 

@@ -107,14 +107,14 @@ def search_list(published: Path) -> str:
     in_words = "; ".join(f"{claims} {verdict}" for verdict, claims in headlines.items())
     sentences = [
         f"Of {len(tried)} readings, {_searched(tried)} of them from a search, {named(best.reading.iloc[0])} agreed "
-        f"most with the text in its single seed: of {len(best)} statements {counted(best)} by "
-        f"{int(best.n_seeds.max())} fresh seeds ([all]({_PAGE})), with {in_words}.",
+        f"most with the text: of {len(best)} statements {counted(best)} by {int(best.n_seeds.max())} fresh seeds "
+        f"([all]({_PAGE})), with {in_words}.",
         f"{_world_in_short(published)} {trade_off_in_short(published)} "
         + (
             _nowhere(tried, closest)
             or f"Each statement's estimate holds in some reading, {rarest['claim']}'s in {rarest['holds']}."
         )
-        + f" Fresh seeds support {len(_supported(confirmed))} of {len(closest)} in some, [the rest]({_PAGE}) in none.",
+        + f" Fresh seeds support {len(_supported(confirmed))} of {len(closest)} in some.",
     ]
     return listed(sentences)
 

@@ -100,8 +100,8 @@ def draw_specification(
         share = 100 * everywhere.holds.astype(bool).mean()
         curve.set_title(f"{claim}\nholds in {share:.0f} %{of_unknown}", fontsize=7)
         _draw_choices(choices, readings.loc[here.reading.astype(int)], decisive[claim][:_DECIDING])
-        choices.set_xlabel("readings in order of the effect", fontsize=7)
     rows[0, 0].set_ylabel("effect")
+    figure.supxlabel("readings in order of the effect", fontsize=7)
     figure.suptitle("Specification curves (green: on the claim's side), and the readings that decide most")
     return figure
 
