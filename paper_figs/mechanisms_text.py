@@ -10,7 +10,7 @@ import pandas as pd
 
 from paper_figs.claims import words
 from paper_figs.claims.learning_table import LABELS
-from paper_figs.markdown import listed, percent, table
+from paper_figs.markdown import listed, paragraph, percent, table
 from paper_figs.plots import style
 from paper_figs.published import csv_of, short
 
@@ -50,7 +50,7 @@ def step_sizes_table(published: Path) -> str:
         cells += [_lead_at(leads[n]) for n in leads]
         rows.append((f"{rate:.3g}", *cells))
     head = (*(f"{LABELS[n]} converges in" for n in _LEARNERS), "TLwD's lead over DDQN", "over DPR")
-    return table(("step size", *head), rows)
+    return f"{table(('step size', *head), rows)}\n\n{paragraph(_step_sizes_in_words(published) + '.')}"
 
 
 def _lead_at(leads: pd.DataFrame) -> str:
@@ -62,19 +62,24 @@ def _lead_at(leads: pd.DataFrame) -> str:
 
 def step_sizes_in_short(published: Path) -> str:
     """With which step sizes TLwD earns more than Double DQN, and when Double DQN converges, for the first page."""
+    return f"{_step_sizes_in_words(published)} ([why](docs/explanation/readings.md#why-small-steps))."
+
+
+def _step_sizes_in_words(published: Path) -> str:
     grid = _by_step_size(published)
     leads = {f"{rate:.3g}": of["ddqn"] for rate, (_, of) in grid.items()}
     ahead = [rate for rate, lead in leads.items() if (lead.ci_low > 0).all()]
     behind = [rate for rate, lead in leads.items() if (lead.ci_high < 0).mean() > 0.5]
-    episodes = [(f"{rate:.3g}", float(here.loc["ddqn", "median"])) for rate, (here, _) in reversed(grid.items())]
-    last = max((i for i, (_, episode) in enumerate(episodes) if np.isfinite(episode)), default=-1)
-    when = [f"{words.number(episode)} with {rate}" for rate, episode in episodes[: last + 1]]
-    length = max(int(here.episodes.max()) for here, _ in grid.values())
-    when += [f"not within {length} with {rate} or less" for rate, _ in episodes[last + 1 : last + 2]]
+    ddqn = {f"{rate:.3g}": here.loc["ddqn"] for rate, (here, _) in grid.items()}
+    in_all = {rate: f"{of['median']:.0f}" for rate, of in ddqn.items() if of["reached"] == 1}
+    median = f" (median episode {', '.join(in_all.values())})" if in_all else ""
+    others = sorted(of["reached"] for of in ddqn.values() if of["reached"] < 1)
+    in_some = f", in {percent(others[0])} to {percent(others[-1])} with the others" if others else ""
+    seeds = max(int(here.n_seeds.max()) for here, _ in grid.values())
     return (
-        f"All else as by default, TLwD earns more than DDQN at every p_1^v with step sizes of {_or_none(ahead)}, less "
-        f"at most of them with {_or_none(behind)}; DDQN converges at p_1^v = {_AT} (median) in episode "
-        f"{', '.join(when)} ([why](docs/explanation/readings.md#why-small-steps))."
+        f"All else as by default ({seeds} seeds), TLwD earns more than DDQN at every p_1^v with step sizes of "
+        f"{_or_none(ahead)}, less at most of them with {_or_none(behind)}; DDQN converges at p_1^v = {_AT} in all runs "
+        f"with {_or_none([*in_all])}{median}{in_some}"
     )
 
 

@@ -48,7 +48,9 @@ def _deciding(sensitivity: pd.DataFrame, claim: str, most: int = 3) -> str:
 
 def readings_list(published: Path) -> str:
     """In which share of the readings the statements hold, and what decides, for the first page."""
-    claims, sensitivity = (csv_of(published, MULTIVERSE.name, name) for name in ("claims", "sensitivity"))
+    claims, sensitivity, known = (
+        csv_of(published, MULTIVERSE.name, name) for name in ("claims", "sensitivity", "known")
+    )
     worthwhile, idle = of_multiverse(tried_in(published))
     by_name = {row["claim"]: row for row in claims.to_dict("records") if row["claim"] in multiverse.HEADLINES}
     judged = {int(row["judged"]) for row in by_name.values() if row["judged"]}
@@ -58,24 +60,28 @@ def readings_list(published: Path) -> str:
             name,
             _holds(by_name[name]),
             held(published, worthwhile, name),
-            *(percent(by_name[name][share]) for share in then),
-            _deciding_where(published, sensitivity, name),
+            *(percent(by_name[name][share]) if by_name[name]["judged"] else "–" for share in then),
+            _deciding_where(published, sensitivity, name) + _known_by(known, name),
         )
         for name in multiverse.HEADLINES
     ]
     verdicts = csv_of(published, MULTIVERSE.name, "verdicts")
     first, seeds = _seeds_of(multiverse.estimates(verdicts)), _seeds_of(multiverse.judged(verdicts))
     of_verdicts = (f"with {seeds} seeds", "supported", "contradicted") if judged else ()
-    head = ("statement", "on its side", "with a trade-off", *of_verdicts, "decided most by (most often with)")
-    of_judged = (
-        f"; of {_from_to(judged)} at random with {seeds} seeds ([verdicts](docs/explanation/readings.md#verdicts))"
+    head = (
+        "statement",
+        "on its side",
+        "with a trade-off",
+        *of_verdicts,
+        "variance predicted: total-order indices (most often with)",
     )
+    of_judged = f"; of {_from_to(judged)} with {seeds} seeds ([verdicts](docs/explanation/readings.md#verdicts))"
     about = paragraph(
         f"Shares of {int(claims.readings.max())} readings ([tables](published/{MULTIVERSE.name})) whose estimate "
-        f"(seeds: {first}) is on the statement's side, with 95 % intervals (unknown: no run converges); of the "
-        f"{len(worthwhile)} of {len(worthwhile) + len(idle)} in which no single action is optimal"
+        f"(seeds: {first}) is on the statement's side, with 95 % intervals (unknown: neither learner converges); of "
+        f"the {len(worthwhile)} of {len(worthwhile) + len(idle)} in which no single action is optimal"
         + (of_judged if judged else "")
-        + "; and what decides it, of what is predicted:"
+        + ":"
     )
     return f"{about}\n\n{table(head, rows)}\n\n{listed([_together(published), step_sizes_in_short(published)])}"
 
@@ -106,6 +112,13 @@ def _deciding_where(published: Path, sensitivity: pd.DataFrame, claim: str) -> s
     return predicted + ", ".join(found) if found else "no single question"
 
 
+def _known_by(known: pd.DataFrame, claim: str) -> str:
+    """What decides whether a statement has an effect at all, where that is asked."""
+    return "".join(
+        f"; known or not: {row['input']} {row['total']:.2f}" for _, row in _strongest(known, claim, 1).iterrows()
+    )
+
+
 def _by_answer(published: Path, claim: str, label: str) -> tuple[list[str], np.ndarray, pd.Series]:
     """Names of a question's answers; which of them each reading has; and whether a statement holds in it."""
     holds = holds_in(published, claim).drop(0, errors="ignore")  # the default is no point of the sample
@@ -128,7 +141,8 @@ def never_judged_so(published: Path, claims: list[str]) -> str:
     return (
         f"Of these, {seeds} seeds support none in the {_from_to(set(shares.judged.astype(int)))} readings of the "
         f"multiverse with verdicts, so they would in at most {percent(shares.supported_high.max())} of readings (each "
-        f"by itself); but {percent(shares.undecided.mean())} of these verdicts are undecided: "
+        f"by itself, and as if readings of a block were independent); but {percent(shares.undecided.mean())} of these "
+        "verdicts are undecided: "
         f"{'; '.join(shares.claim)}."
     )
 
@@ -136,11 +150,12 @@ def never_judged_so(published: Path, claims: list[str]) -> str:
 def judged_table(published: Path) -> str:
     """One row per statement: shares of its verdicts in the readings that have seeds enough for one."""
     claims = csv_of(published, MULTIVERSE.name, "claims")
-    names = (*VERDICTS, "negligible")
+    names = (*VERDICTS, "unknown_then", "negligible")
     rows = [
-        (row["claim"], *(share(row, name) for name in names)) for row in claims.query("judged > 0").to_dict("records")
+        (row["claim"], *("–" if np.isnan(row[name]) else share(row, name) for name in names))
+        for row in claims.query("judged > 0").to_dict("records")
     ]
-    return table(("statement", *names), rows)
+    return table(("statement", *VERDICTS, "of these unknown", "negligible, of those that compare"), rows)
 
 
 def looks_table(published: Path) -> str:

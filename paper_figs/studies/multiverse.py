@@ -141,7 +141,8 @@ def shares(found: pd.DataFrame) -> pd.DataFrame:
     """One row per claim: the share of readings where it holds; of those with seeds enough, that of each verdict.
 
     A claim is `unknown` where it has no effect, as where no run that it compares ever converges. `holds` and `unknown`
-    are of `estimates`, all else of what is `judged`: `holds_then` of the same estimates with more seeds.
+    are of `estimates`, all else of what is `judged`, with `holds_then` and `unknown_then` as there; `negligible` is of
+    those where learners are compared.
     The limits are of 95 %, for readings that come in blocks; `readings` and `judged` count what the shares are of.
     """
     rows = []
@@ -150,8 +151,9 @@ def shares(found: pd.DataFrame) -> pd.DataFrame:
         row: dict[str, object] = {"claim": claim, "readings": len(first), "judged": len(then)}
         found_in = {"holds": (first, first.holds.astype(bool)), "unknown": (first, first.value.isna())}
         found_in |= {verdict: (then, then.verdict == verdict) for verdict in VERDICTS}
-        found_in["negligible"] = then, then.negligible == True  # noqa: E712
-        found_in["holds_then"] = then, then.holds.astype(bool)
+        compared = then.loc[then.negligible.notna()]
+        found_in["negligible"] = compared, compared.negligible.astype(bool)
+        found_in |= {"holds_then": (then, then.holds.astype(bool)), "unknown_then": (then, then.value.isna())}
         for name, (of, holds) in found_in.items():
             share = share_of(holds, of.reading) if len(of) else (np.nan,) * 3
             row |= dict(zip((name, f"{name}_low", f"{name}_high"), map(float, share), strict=True))
