@@ -49,7 +49,7 @@ def of_readings(source: xr.Dataset, target: xr.Dataset) -> Iterator[tuple[int, l
 
 
 def verdicts(judged: list[tuple[int, list[Judgement]]]) -> pd.DataFrame:
-    """One row per reading and claim whose figure was run: the effect with its interval, and the verdict.
+    """One row per reading and claim: the effect with its interval, and the verdict; without seeds if it was not run.
 
     A claim `holds` if its estimate, whatever its interval, is on the claim's side.
     """
@@ -67,7 +67,6 @@ def verdicts(judged: list[tuple[int, list[Judgement]]]) -> pd.DataFrame:
         }
         for number, of_reading in judged
         for c in of_reading
-        if c.n_seeds
     ]
     return pd.DataFrame(rows)
 

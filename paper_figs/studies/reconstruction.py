@@ -89,7 +89,7 @@ def search(effort: Effort, size: Size, out: Path, run: Callable[..., Path]) -> l
         found += generation
     tried = known + found
     lost = lost_by_one_action([one.unit for one in tried])
-    used = max(size.seeds, *(int(one.verdicts.n_seeds.max()) for one in tried))
+    used = max([size.seeds, *(int(one.verdicts.n_seeds.max()) for one in known)])
     chosen, fresh = choice_of(tried, lost), of_seeds(size, used + effort.confirm)
     tables = {"tried": tried_table(tried, lost), "closest": closest_table(tried)}
     confirmed, written = [], []

@@ -71,7 +71,8 @@ def summarise_multiverse(sweeps: tuple[Sweep, ...], size: Size, out: Path, keep:
 
 
 def _of_block(sweep: Sweep, size: Size, out: Path) -> pd.DataFrame:
-    """The verdicts in a block's readings."""
+    """The verdicts in a block's readings, of the claims whose figures were run."""
     assert sweep.source
     source, target = (store.load(out / part.name, size.seeds) for part in (sweep.source, sweep))
-    return multiverse.verdicts(list(multiverse.of_readings(source, target)))
+    found = multiverse.verdicts(list(multiverse.of_readings(source, target)))
+    return found.loc[found.n_seeds > 0]

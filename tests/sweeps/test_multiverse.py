@@ -11,6 +11,7 @@ import pytest
 
 import jrcjax
 from jrcjax.config.paths import number_at, parameter_at
+from paper_figs.claims.table import CLAIMS
 from paper_figs.studies import summaries
 from paper_figs.studies.multiverse import estimates, finished, judged, together, undecided
 from sweeps.__main__ import main
@@ -133,6 +134,11 @@ def test_a_tiny_multiverse_judges_all_claims_in_each_reading(tmp_path):
     before = (summary / "verdicts.csv").read_bytes()
     assert main([*run, "--keep"]) == 0  # nothing left to run
     assert (summary / "verdicts.csv").read_bytes() == before
+    assert main([*run, "--keep", "--undecided", "C4 (reward)", "--seeds", "3"]) == 0
+    both = pd.read_csv(summary / "verdicts.csv")
+    more = both[both.n_seeds == 3]
+    assert set(more.claim) == {claim.claim for claim in CLAIMS if claim.sweep in ("fig5a", "fig5b")}
+    pd.testing.assert_frame_equal(both[both.n_seeds == 2].reset_index(drop=True), found)
 
 
 @pytest.fixture
