@@ -20,6 +20,13 @@ import numpy as np
 from jrcjax import files, numerics, provenance
 
 
+def folder() -> Path | None:
+    """Where compiled programs are kept on this machine, if they are."""
+    path = jax.config.jax_compilation_cache_dir  # pyright: ignore[reportAttributeAccessIssue]
+    wanted = jax.config.jax_enable_compilation_cache  # pyright: ignore[reportAttributeAccessIssue]
+    return Path(path) if wanted and path and "://" not in path else None  # it may be a bucket
+
+
 def kept(name: str, content: object, make: Callable[[], jax.Array]) -> np.ndarray:
     """What `make` gives, from disk if a process with the same code has made it before on such a machine.
 
@@ -30,13 +37,12 @@ def kept(name: str, content: object, make: Callable[[], jax.Array]) -> np.ndarra
       content: what they are made from, with a `repr` that tells all of it.
       make: makes them.
     """
-    folder = jax.config.jax_compilation_cache_dir  # pyright: ignore[reportAttributeAccessIssue]
-    wanted = jax.config.jax_enable_compilation_cache  # pyright: ignore[reportAttributeAccessIssue]
-    if not wanted or folder is None or "://" in folder:  # programs may be kept in a bucket
+    where = folder()
+    if where is None:
         return np.asarray(make())
     decides = repr((content, _code(), numerics.in_force(), _devices()))
     key = hashlib.sha256(decides.encode()).digest()
-    path = Path(folder, name, f"{key.hex()}.npy")
+    path = Path(where, name, f"{key.hex()}.npy")
     with contextlib.suppress(OSError, ValueError, files.DamagedFile):
         found = files.unsealed(path)
         if found.startswith(key):

@@ -31,6 +31,16 @@ def share(row: Mapping[Hashable, Any], name: str) -> str:
     return f"{percent(row[name])} ({100 * row[f'{name}_low']:.3g} to {100 * row[f'{name}_high']:.3g})"
 
 
+def seeds_of(verdicts: pd.DataFrame) -> str:
+    """How many seeds rows have: "5", "1 to 5"."""
+    return from_to({int(n) for n in verdicts.n_seeds.dropna()})
+
+
+def from_to(numbers: set[int]) -> str:
+    """The ends of some numbers, or the only one."""
+    return " to ".join(str(n) for n in sorted({min(numbers), max(numbers)})) if numbers else "no"
+
+
 def share_of(holds: pd.Series) -> str:
     """The share of readings in which a statement holds; the series' index is the readings' numbers."""
     if holds.empty:

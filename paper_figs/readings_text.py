@@ -11,11 +11,9 @@ import numpy as np
 import pandas as pd
 
 from jrcjax.readings import Loss
-from paper_figs.claims.judge import VERDICTS
-from paper_figs.claims.results import Rules
 from paper_figs.markdown import listed, paragraph, percent, table
 from paper_figs.mechanisms_text import step_sizes_in_short
-from paper_figs.published import csv_of, held, holds_in, of_multiverse, share, share_of, tried_in
+from paper_figs.published import csv_of, from_to, held, holds_in, of_multiverse, seeds_of, share, share_of, tried_in
 from paper_figs.studies import multiverse
 from sweeps.design import in_range
 from sweeps.preset import SOURCES
@@ -24,6 +22,7 @@ from sweeps.studies.readings import READINGS, SOURCE, Reading, as_text, choices,
 
 TOGETHER = ("C5 (highest)", "C13 (highest)")
 """Statements that loss and source decide together."""
+_LABELS = {reading.path: reading.label for reading in READINGS}
 _NEARLY_ALL = 0.9
 _BLIND = 1.0  # cross-validated error from which a surrogate is no better than the mean
 _DECIDING = 0.05  # least total-order index, from its lower limit, of a question that is said to decide
@@ -66,7 +65,7 @@ def readings_list(published: Path) -> str:
         for name in multiverse.HEADLINES
     ]
     verdicts = csv_of(published, MULTIVERSE.name, "verdicts")
-    first, seeds = _seeds_of(multiverse.estimates(verdicts)), _seeds_of(multiverse.judged(verdicts))
+    first, seeds = seeds_of(multiverse.estimates(verdicts)), seeds_of(multiverse.judged(verdicts))
     of_verdicts = (f"with {seeds} seeds", "supported", "contradicted") if judged else ()
     head = (
         "statement",
@@ -75,7 +74,7 @@ def readings_list(published: Path) -> str:
         *of_verdicts,
         "variance predicted: total-order indices (most often with)",
     )
-    of_judged = f"; of {_from_to(judged)} with {seeds} seeds ([verdicts](docs/explanation/readings.md#verdicts))"
+    of_judged = f"; of {from_to(judged)} with {seeds} seeds ([verdicts](docs/explanation/readings.md#verdicts))"
     about = paragraph(
         f"Shares of {int(claims.readings.max())} readings ([tables](published/{MULTIVERSE.name})) whose estimate "
         f"(seeds: {first}) is on the statement's side, with 95 % intervals (unknown: neither learner converges); of "
@@ -84,15 +83,6 @@ def readings_list(published: Path) -> str:
         + ":"
     )
     return f"{about}\n\n{table(head, rows)}\n\n{listed([_together(published), step_sizes_in_short(published)])}"
-
-
-def _seeds_of(verdicts: pd.DataFrame) -> str:
-    """How many seeds rows have: "5", "1 to 5"."""
-    return _from_to({int(n) for n in verdicts.n_seeds.dropna()})
-
-
-def _from_to(numbers: set[int]) -> str:
-    return " to ".join(str(n) for n in sorted({min(numbers), max(numbers)})) if numbers else "no"
 
 
 def _deciding_where(published: Path, sensitivity: pd.DataFrame, claim: str) -> str:
@@ -121,78 +111,20 @@ def _known_by(known: pd.DataFrame, claim: str) -> str:
 
 def _by_answer(published: Path, claim: str, label: str) -> tuple[list[str], np.ndarray, pd.Series]:
     """Names of a question's answers; which of them each reading has; and whether a statement holds in it."""
-    holds = holds_in(published, claim).drop(0, errors="ignore")  # the default is no point of the sample
+    holds = _holds_in_sample(published, claim)
     (reading,) = (reading for reading in READINGS if reading.label == label)
     return *_answers(reading, _places_of(holds)[label].to_numpy()), holds
+
+
+def _holds_in_sample(published: Path, claim: str) -> pd.Series:
+    """`holds_in` without the default, which is no point of the sample."""
+    return holds_in(published, claim).drop(0, errors="ignore")
 
 
 def _places_of(holds: pd.Series) -> pd.DataFrame:
     """Places of the readings that a series is about."""
     numbers = holds.index.to_numpy(int)
     return multiverse.places(int(numbers.max(initial=0)) + 1).loc[numbers]
-
-
-def never_judged_so(published: Path, claims: list[str]) -> str:
-    """Which of some statements no reading with seeds enough for a verdict supports, and what bound that gives."""
-    shares = csv_of(published, MULTIVERSE.name, "claims").query("claim in @claims and judged > 0 and supported == 0")
-    if shares.empty:
-        return "Each of these is supported in some of the multiverse's readings with verdicts."
-    seeds = _seeds_of(multiverse.judged(csv_of(published, MULTIVERSE.name, "verdicts")))
-    return (
-        f"Of these, {seeds} seeds support none in the {_from_to(set(shares.judged.astype(int)))} readings of the "
-        f"multiverse with verdicts, so they would in at most {percent(shares.supported_high.max())} of readings (each "
-        f"by itself, and as if readings of a block were independent); but {percent(shares.undecided.mean())} of these "
-        "verdicts are undecided: "
-        f"{'; '.join(shares.claim)}."
-    )
-
-
-def judged_table(published: Path) -> str:
-    """One row per statement: shares of its verdicts in the readings that have seeds enough for one."""
-    claims = csv_of(published, MULTIVERSE.name, "claims")
-    names = (*VERDICTS, "unknown_then", "negligible")
-    rows = [
-        (row["claim"], *("–" if np.isnan(row[name]) else share(row, name) for name in names))
-        for row in claims.query("judged > 0").to_dict("records")
-    ]
-    return table(("statement", *VERDICTS, "of these unknown", "negligible, of those that compare"), rows)
-
-
-def looks_table(published: Path) -> str:
-    """The statements of the first page in the readings with seeds enough for verdicts: few seeds, and all of them."""
-    found = multiverse.sampled(csv_of(published, MULTIVERSE.name, "verdicts"))
-    then, rows = multiverse.judged(found), []
-    first = multiverse.estimates(found)
-    for claim in multiverse.HEADLINES:
-        few, many = (of.loc[of.claim == claim].set_index("reading").holds.astype(bool) for of in (first, then))
-        if many.empty:
-            continue
-        few = few.loc[many.index]
-        cells = (f"{holds.sum()} of {len(holds)}" for holds in (few, many))
-        rows.append((claim, *cells, str((many & ~few).sum()), str((few & ~many).sum())))
-    head = ("statement", *(f"on its side, seeds: {_seeds_of(of)}" for of in (first, then)), "came to it", "left it")
-    return table(head, rows)
-
-
-def judged_list(published: Path) -> str:
-    """What has a verdict, and what verdicts say in most readings."""
-    claims, verdicts = (csv_of(published, MULTIVERSE.name, name) for name in ("claims", "verdicts"))
-    judged = multiverse.judged(multiverse.sampled(verdicts))
-    if judged.empty:
-        return listed([f"No reading has seeds enough for a verdict, which takes {Rules().least_seeds}."])
-    mostly = {v: claims.claim[claims[f"{v}_low"] > 0.5] for v in ("supported", "contradicted")}
-    never = claims.claim[claims.supported == 0]
-    in_words = [
-        f"In more than half, interval included, {v}: {'; '.join(names) or 'none'}." for v, names in mostly.items()
-    ]
-    return listed(
-        [
-            f"{judged.reading.nunique()} of {verdicts.reading.nunique()} readings have {_seeds_of(judged)} seeds, and "
-            f"{len(judged)} verdicts: " + ", ".join(f"{(judged.verdict == v).sum()} {v}" for v in VERDICTS) + ".",
-            *in_words,
-            f"Supported in none of them: {'; '.join(never) or 'none'}.",
-        ]
-    )
 
 
 def extremes_list(published: Path) -> str:
@@ -211,17 +143,16 @@ def extremes_list(published: Path) -> str:
 def _together(published: Path) -> str:
     """What the loss and the source decide together, everywhere and where there is a trade-off."""
     chosen = {"hparams.loss": Loss.HUBER.value, SOURCE: SOURCES.index("table1")}
-    labels = {reading.path: reading.label for reading in READINGS}
     worthwhile, _ = of_multiverse(tried_in(published))
 
     def apart(holds: pd.Series) -> str:
         places = _places_of(holds)
-        here = np.all([places[labels[path]] == answer for path, answer in chosen.items()], axis=0)
+        here = np.all([places[_LABELS[path]] == answer for path, answer in chosen.items()], axis=0)
         return " and ".join(percent(holds.loc[of].mean()) for of in (here, ~here))
 
     parts = []
     for claim in TOGETHER:
-        holds = holds_in(published, claim).drop(0)
+        holds = _holds_in_sample(published, claim)
         worth_it = holds.loc[holds.index.isin(worthwhile.index)]
         parts.append(f"{claim} holds in {apart(holds)} (with a trade-off: {apart(worth_it)})")
     return (
@@ -233,11 +164,11 @@ def _together(published: Path) -> str:
 
 def pair_table(published: Path) -> str:
     """Where the statements of the first page hold, by the loss in the target and what the source was trained with."""
-    rows, labels = [], {reading.path: reading.label for reading in READINGS}
+    rows = []
     losses, sources = ([str(as_text(path, i)) for i in range(2)] for path in ("hparams.loss", SOURCE))
     for claim in multiverse.HEADLINES:
-        holds = holds_in(published, claim).drop(0, errors="ignore")
-        loss, source = (_places_of(holds)[labels[path]].to_numpy() for path in ("hparams.loss", SOURCE))
+        holds = _holds_in_sample(published, claim)
+        loss, source = (_places_of(holds)[_LABELS[path]].to_numpy() for path in ("hparams.loss", SOURCE))
         rows.append((claim, *(share_of(holds.loc[(loss == i) & (source == j)]) for i in range(2) for j in range(2))))
     return table(("statement", *(f"{loss}, {source}" for loss in losses for source in sources)), rows)
 
@@ -331,9 +262,6 @@ BLOCKS: dict[str, Callable[[Path], str]] = {
     "readings": readings_list,
     "extremes": extremes_list,
     "decided": decided_table,
-    "judged": judged_list,
-    "judged_table": judged_table,
-    "looks": looks_table,
     "outcomes": outcomes_table,
     "questions": questions_table,
     "answers": answers_table,

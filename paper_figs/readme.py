@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from paper_figs import mechanisms_text, readings_text, reconstruction_text, trade_off_text
+from paper_figs import mechanisms_text, readings_text, reconstruction_text, trade_off_text, verdicts_text
 from paper_figs.claims import words
 from paper_figs.claims.judge import VERDICTS, Judgement, from_json
 from paper_figs.claims.learning_table import LABELS
@@ -254,6 +254,7 @@ BLOCKS: dict[str, Callable[[Path], str]] = {
     "robustness": robustness_list,
     "calibration": calibration_list,
     **readings_text.BLOCKS,
+    **verdicts_text.BLOCKS,
     **mechanisms_text.BLOCKS,
     **reconstruction_text.BLOCKS,
     **trade_off_text.BLOCKS,

@@ -29,10 +29,10 @@ from paper_figs.published import (
     with_trade_off,
     worth,
 )
-from paper_figs.readings_text import never_judged_so
 from paper_figs.studies import multiverse
 from paper_figs.studies.reconstruction import ALL, BEST, DEFAULT, LEAST_LOSS, TRADE_OFF
 from paper_figs.trade_off_text import trade_off_in_short
+from paper_figs.verdicts_text import never_judged_so
 from sweeps.studies.readings import READINGS
 from sweeps.studies.reconstruction import NAME
 

@@ -109,11 +109,8 @@ def trade_off_in_short(published: Path) -> str:
     (worthwhile, idle), best = of_multiverse(tried), best_for(confirmed_in(published), TRADE_OFF)
     if worthwhile.empty:
         return "No reading of the multiverse has a trade-off in the target."
-    share, claim, fresh = (
-        len(worthwhile) / (len(worthwhile) + len(idle)),
-        multiverse.HEADLINES[0],
-        "fresh seeds to come",
-    )
+    share, claim = len(worthwhile) / (len(worthwhile) + len(idle)), multiverse.HEADLINES[0]
+    fresh = "fresh seeds to come"
     if not best.empty:
         fresh = f"{counted(best)}; {claim} {', '.join(best.verdict[best.claim == claim]) or 'unknown'}"
     return (

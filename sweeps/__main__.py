@@ -178,18 +178,19 @@ def _multiverse(command: Run) -> Study:
     """The readings asked for: all, or with --keep those that the summary does not have, or is undecided about."""
     from sweeps.studies import multiverse
 
-    which = command.readings, command.smoke, command.first, command.per_block
+    which, selection = (command.readings, command.smoke, command.first), multiverse.Selection(command.per_block)
     if not command.keep:
         if command.undecided is not None:
             refuse("keep", False, "True beside --undecided, which adds seeds to what a summary says of other readings")
-        return multiverse.study_of(*which)
+        return multiverse.study_of(*which, selection)
     size = size_of(command.seeds, command.episodes, "paper", command.smoke, multiverse.MULTIVERSE)
     if command.undecided is None:
         multiverse.require_summary(command.out, size)
-        return multiverse.study_of(*which, without=_found(_FINISHED)(command.out, size.seeds))
+        finished = _found(_FINISHED)(command.out, size.seeds)
+        return multiverse.study_of(*which, selection._replace(without=finished))
     asked, figure = _found(_UNDECIDED)(command.out, command.undecided, size.seeds)
     multiverse.require_summary(command.out, size)
-    study = multiverse.study_of(*which, asked=asked, figure=figure)
+    study = multiverse.study_of(*which, selection._replace(asked=asked, figure=figure))
     if not study.sweeps:
         allowed = f"a claim with undecided readings of fewer than {size.seeds} seeds among these"
         refuse("undecided", command.undecided, allowed)

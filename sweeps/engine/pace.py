@@ -10,9 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-import jax
-
-from jrcjax import files
+from jrcjax import files, kept
 
 _ENOUGH = 1.0  # seconds of measured work below which a run says nothing of the pace
 _COMPILED = 5.0  # seconds; programs that were kept start faster
@@ -39,10 +37,10 @@ def of_machine() -> Pace:
 
 
 def _file() -> Path:
-    folder = jax.config.jax_compilation_cache_dir  # pyright: ignore[reportAttributeAccessIssue]
+    folder = kept.folder()
     if folder is None:
         raise FileNotFoundError("no folder of compiled programs")
-    return Path(folder, "pace.json")
+    return folder / "pace.json"
 
 
 class Stopwatch:

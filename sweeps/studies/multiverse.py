@@ -94,7 +94,7 @@ def block_sweep(
     sources = [{"reading": float(n)} | _source(of) for n, of in zip(numbers, values, strict=True)]
     name = f"{study}/{numbers[0]:06d}-{numbers[-1]:06d}"
     if len(numbers) <= numbers[-1] - numbers[0]:  # some of them, which others may start and end like
-        name += f"-{hashlib.sha256(repr(tuple(numbers)).encode()).hexdigest()[:8]}"
+        name += f"-{digest_of(tuple(numbers))}"
     source = Sweep(
         name=f"{name}-source",
         description="source agents of these readings",
@@ -117,6 +117,11 @@ def block_sweep(
     )
 
 
+def digest_of(content: object) -> str:
+    """Eight digits that tell names of folders apart."""
+    return hashlib.sha256(repr(content).encode()).hexdigest()[:8]
+
+
 def _target(values: Mapping[str, float]) -> dict[str, float]:
     return {path: value for path, value in values.items() if path != SOURCE}
 
@@ -129,31 +134,35 @@ def _source(values: Mapping[str, float]) -> dict[str, float]:
     return {path: value for path, value in own.items() if path.startswith("env.") or path in ALWAYS_SHARED}
 
 
-def sweeps_of(
-    number: int,
-    first: int = 0,
-    per_block: int = PER_BLOCK,
-    asked: Collection[int] | None = None,
-    without: Collection[int] = (),
-    figure: str | None = None,
-) -> tuple[Sweep, ...]:
-    """The blocks of readings `first` to `first + number`: so many of each, or those of them asked for.
+class Selection(NamedTuple):
+    """Which readings of each block are run, and at which points."""
 
-    Args:
-      number: of readings.
-      first: of the readings, the first of a block.
-      per_block: how many readings of each block, see `some_of`.
-      asked: the readings asked for; all if None.
-      without: readings to leave out.
-      figure: whose points are run, with the target as it is; all if None.
-    """
+    per_block: int = PER_BLOCK
+    """How many, see `some_of`."""
+    asked: Collection[int] | None = None
+    """The readings asked for of these; all if None."""
+    without: Collection[int] = ()
+    """Readings to leave out."""
+    figure: str | None = None
+    """Whose points are run, with the target as it is; all if None."""
+
+    def of(self, block: Sequence[int]) -> list[int]:
+        """The readings of a block that are run."""
+        some = some_of(block, self.per_block)
+        return [n for n in some if (self.asked is None or n in self.asked) and n not in self.without]
+
+
+ALL = Selection()
+
+
+def sweeps_of(number: int, first: int = 0, selection: Selection = ALL) -> tuple[Sweep, ...]:
+    """The blocks of readings `first`, which is the first of a block, to `first + number`, as far as selected."""
     values = {first + i: values_at(unit) for i, unit in enumerate(unit_of(number, first))}
-    blocks = [some_of(list(of), per_block) for _, of in itertools.groupby(values, lambda n: n // PER_BLOCK)]
-    chosen = [[n for n in of if (asked is None or n in asked) and n not in without] for of in blocks]
+    blocks = [selection.of(list(block)) for _, block in itertools.groupby(values, lambda n: n // PER_BLOCK)]
     name, points = "multiverse", tuple(range(len(POINTS)))
-    if figure is not None:
-        name, points = f"{name}/{figure}", points_of({figure})
-    return tuple(block_sweep(name, of, [values[n] for n in of], points, _per_part(of, points)) for of in chosen if of)
+    if selection.figure is not None:
+        name, points = f"{name}/{selection.figure}", points_of({selection.figure})
+    return tuple(block_sweep(name, of, [values[n] for n in of], points, _per_part(of, points)) for of in blocks if of)
 
 
 def some_of(block: Sequence[int], number: int) -> list[int]:
@@ -182,16 +191,8 @@ MULTIVERSE = Study(
 )
 
 
-def study_of(
-    number: int | None,
-    smoke: bool,
-    first: int = 0,
-    per_block: int = PER_BLOCK,
-    asked: Collection[int] | None = None,
-    without: Collection[int] = (),
-    figure: str | None = None,
-) -> Study:
-    """The study of the readings from `first` on, up to so many in all; for the rest see `sweeps_of`.
+def study_of(number: int | None, smoke: bool, first: int = 0, selection: Selection = ALL) -> Study:
+    """The study of the readings from `first` on, up to so many in all, as far as selected.
 
     Raises:
       ValueError: naming the argument, the value and what is allowed.
@@ -201,8 +202,8 @@ def study_of(
     require_integer("readings", number, 1, _MOST)
     if first not in range(0, number, PER_BLOCK):
         refuse("first", first, f"a multiple of {PER_BLOCK} from 0 on, less than readings = {number}")
-    require_integer("per_block", per_block, 1, PER_BLOCK)
-    return MULTIVERSE.with_sweeps(sweeps_of(number - first, first, per_block, asked, without, figure))
+    require_integer("per_block", selection.per_block, 1, PER_BLOCK)
+    return MULTIVERSE.with_sweeps(sweeps_of(number - first, first, selection))
 
 
 def verdicts_file(out: Path) -> Path:

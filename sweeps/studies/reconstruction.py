@@ -5,14 +5,13 @@ What judges readings lies in a layer above, see `paper_figs.studies.reconstructi
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from jrcjax.checks import require_integer
-from sweeps.studies.multiverse import SIZE, SMOKE, block_sweep, points_of
+from sweeps.studies.multiverse import SIZE, SMOKE, block_sweep, digest_of, points_of
 from sweeps.studies.readings import values_at
 from sweeps.sweep import Size, Study, Sweep
 
@@ -68,8 +67,7 @@ def generation_sweep(first: int, units: Sequence[np.ndarray]) -> Sweep:
 def confirmation_sweep(unit: np.ndarray, figures: Collection[str]) -> Sweep:
     """A reading that is confirmed at the points of some figures, named by what it is."""
     values, points = values_at(unit), points_of(figures)
-    name = hashlib.sha256(repr((values, points)).encode()).hexdigest()[:8]
-    return block_sweep(f"{NAME}/confirmed/{name}", [0], [values], points, _CONFIRMED_PER_PART)
+    return block_sweep(f"{NAME}/confirmed/{digest_of((values, points))}", [0], [values], points, _CONFIRMED_PER_PART)
 
 
 RECONSTRUCTION = Study(

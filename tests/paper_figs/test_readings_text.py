@@ -7,7 +7,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from paper_figs import mechanisms_text, publish, readings_text, readme, reconstruction_text, trade_off_text
+from paper_figs import (
+    mechanisms_text,
+    publish,
+    readings_text,
+    readme,
+    reconstruction_text,
+    trade_off_text,
+    verdicts_text,
+)
 from paper_figs.studies import multiverse
 from sweeps.preset import preset_of
 from sweeps.studies.readings import READINGS, SOURCE, unit_of, values_at
@@ -164,7 +172,7 @@ def test_shares_and_what_decides_are_those_of_the_tables(published):
 
 
 def test_what_has_a_verdict_and_what_verdicts_say(published):
-    text = readings_text.judged_list(published)
+    text = verdicts_text.judged_list(published)
     assert " ".join(text.split()).startswith(
         "- 3 of 41 readings have 5 seeds, and 6 verdicts: 0 supported, 4 contradicted, 2 undecided."
     )
@@ -175,7 +183,7 @@ def test_what_has_a_verdict_and_what_verdicts_say(published):
     )
     assert f"Supported in none of them: {everything}." in " ".join(text.split())
     assert "| C4 | 0 % (-10 to 10) | 75 % (65 to 85) | 25 % (15 to 35) | 10 % (0 to 20) | 0 % (-10 to 10) |" in (
-        readings_text.judged_table(published)
+        verdicts_text.judged_table(published)
     )
     first_page = " ".join(readings_text.readings_list(published).split())
     assert "of 2 with 5 seeds ([verdicts](docs/" in first_page
@@ -185,7 +193,7 @@ def test_what_has_a_verdict_and_what_verdicts_say(published):
 def test_estimates_of_few_and_of_many_seeds_stand_beside_each_other(published):
     few = pd.read_csv(published / "multiverse" / "verdicts.csv").query("claim == 'C3 (TLwD)' and n_seeds == 1")
     few = few.set_index("reading").holds.loc[[7, 9, 11]]
-    head, _, row, *others = readings_text.looks_table(published).splitlines()
+    head, _, row, *others = verdicts_text.looks_table(published).splitlines()
     assert head == "| statement | on its side, seeds: 1 | on its side, seeds: 5 | came to it | left it |"
     assert not few.loc[9]
     assert row == f"| C3 (TLwD) | {few.sum()} of 3 | 1 of 3 | 1 | {few.sum()} |"
@@ -221,8 +229,8 @@ def test_readings_of_a_single_seed_have_no_verdicts(published):
             file, index=False
         )
     assert "verdict" not in readings_text.readings_list(published)
-    assert readings_text.judged_list(published).startswith("- No reading has seeds enough for a verdict")
-    assert readings_text.judged_table(published).count("\n") == 1
+    assert verdicts_text.judged_list(published).startswith("- No reading has seeds enough for a verdict")
+    assert verdicts_text.judged_table(published).count("\n") == 1
 
 
 def test_what_two_questions_decide_together_is_told_apart(published):

@@ -18,7 +18,7 @@ from sweeps.__main__ import main
 from sweeps.engine.job import Job
 from sweeps.preset import base_of
 from sweeps.results import store
-from sweeps.studies.multiverse import POINTS, SMOKE, some_of, sweeps_of
+from sweeps.studies.multiverse import POINTS, SMOKE, Selection, some_of, sweeps_of
 from sweeps.studies.readings import (
     PER_BLOCK,
     READINGS,
@@ -51,12 +51,12 @@ def test_a_reading_is_the_same_whatever_the_number_of_readings():
         f"multiverse/{a}" for a in ("000000-000063", "000064-000127", "000128-000135")
     ]
     assert sweeps_of(PER_BLOCK, first=PER_BLOCK) == blocks[1:2]
-    for of_block, whole in zip(sweeps_of(2 * PER_BLOCK + 8, per_block=3), blocks, strict=True):
+    for of_block, whole in zip(sweeps_of(2 * PER_BLOCK + 8, selection=Selection(3)), blocks, strict=True):
         here = frame(whole).reading.isin(of_block.design.values("reading"))
         assert here.sum() == 3 * len(POINTS)
         part = frame(of_block)
         pd.testing.assert_frame_equal(part, frame(whole).loc[here, part.columns].reset_index(drop=True))
-    assert sweeps_of(PER_BLOCK + 1, per_block=3)[1] == sweeps_of(1, first=PER_BLOCK)[0]
+    assert sweeps_of(PER_BLOCK + 1, selection=Selection(3))[1] == sweeps_of(1, first=PER_BLOCK)[0]
 
 
 def test_some_readings_of_a_block_are_a_random_sample():
@@ -157,7 +157,7 @@ def made_up(monkeypatch, tmp_path):
         return pd.DataFrame(rows)
 
     def summarise(folder, number, first=0, seeds=1, keep=False, per_block=PER_BLOCK):
-        sweeps = sweeps_of(number, first, per_block)
+        sweeps = sweeps_of(number, first, Selection(per_block))
         for sweep in sweeps:
             for part in (sweep, sweep.source):
                 path = tmp_path / folder / part.name / store.MANIFEST
@@ -212,7 +212,7 @@ def test_more_seeds_go_where_a_claim_is_undecided(made_up, tmp_path, capsys):
     assert asked == [n for n in range(2 * PER_BLOCK) if n not in (0, 2, 3, 7, 64)]
     assert figure == "fig5b"
     assert undecided(tmp_path / "out", claim, 5)[0] == []
-    sweeps = sweeps_of(2 * PER_BLOCK, per_block=60, asked=asked, figure=figure)
+    sweeps = sweeps_of(2 * PER_BLOCK, selection=Selection(60, asked, figure=figure))
     sampled = [some_of(range(first, first + PER_BLOCK), 60) for first in (0, PER_BLOCK)]
     numbers = [sweep.design.values("reading").tolist() for sweep in sweeps]  # one point of each
     assert numbers == [[n for n in of if n in asked] for of in sampled]
@@ -236,7 +236,8 @@ def test_what_a_summary_has_with_so_many_seeds_is_not_run_again(made_up, tmp_pat
     assert done == {n for of in few for n in of}
     assert finished(tmp_path / "out", 1) == set(range(2 * PER_BLOCK))
     assert finished(tmp_path / "out", 7) == set()
-    new = [sweep.source.design.values("reading") for sweep in sweeps_of(2 * PER_BLOCK, per_block=5, without=done)]
+    sweeps = sweeps_of(2 * PER_BLOCK, selection=Selection(5, without=done))
+    new = [sweep.source.design.values("reading") for sweep in sweeps]
     assert [set(of) for of in new] == [set(b) - set(a) for a, b in zip(few, more, strict=True)]
     # With nothing left to run the summary is made anew, of what it has.
     before = (tmp_path / "out" / "multiverse" / "summary" / "verdicts.csv").read_bytes()
@@ -247,7 +248,7 @@ def test_what_a_summary_has_with_so_many_seeds_is_not_run_again(made_up, tmp_pat
 
 
 def test_the_points_of_a_figure_are_those_of_the_whole_reading():
-    (whole,), (part,) = sweeps_of(2), sweeps_of(2, asked=[1], figure="fig6")
+    (whole,), (part,) = sweeps_of(2), sweeps_of(2, selection=Selection(asked=[1], figure="fig6"))
     expected = frame(whole).query("reading == 1 and point_of_reading < 4").reset_index(drop=True)
     found = frame(part)
     assert len(found) == 4
