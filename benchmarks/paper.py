@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from pathlib import Path
 
 from benchmarks.measure import Case, NotMeasured, Result, alone
 from benchmarks.peers import sb3_dqn
@@ -51,16 +52,23 @@ def _seconds_of_figures(quick: bool) -> float:
 def lanes_of(points: int, seeds: int, cores: int) -> tuple[int, int]:
     """Lanes of a learner that so many cores advance, and those asked for."""
     from jrcjax.training import parallel
+    from sweeps.engine.together import parts_for
 
-    return parallel.padded(points * seeds, parallel.BLOCK, max(cores, 2)), points * seeds
+    devices = max(cores, 2)
+    used = (parallel.padded(points * part, parallel.BLOCK, devices) for part in parts_for(points, seeds, devices))
+    return sum(used), points * seeds
 
 
 def _print_lanes() -> None:
+    from sweeps.engine.plan import plan
     from sweeps.studies.registry import SWEEPS
+    from sweeps.sweep import Size
 
-    names = [name for name in SWEEPS if name.startswith("fig")]
+    with tempfile.TemporaryDirectory() as empty:
+        figures = [sweep for name, sweep in SWEEPS.items() if name.startswith("fig")]
+        groups = plan(figures, Size(seeds=_SEEDS), Path(empty))
     print(f"lanes per learner for {_SEEDS} seeds, used / asked for")
-    print(f"{'cores':>7s}" + "".join(f"{name:>10s}" for name in names))
-    for cores in _CORES:
-        lanes = ["{} / {}".format(*lanes_of(len(SWEEPS[name].design), _SEEDS, cores)) for name in names]
-        print(f"{cores:7d}" + "".join(f"{of_sweep:>10s}" for of_sweep in lanes))
+    for group in groups:
+        of_cores = {cores: "{} / {}".format(*lanes_of(len(group.job.sweep.design), _SEEDS, cores)) for cores in _CORES}
+        told = ", ".join(f"{lanes} on {cores} cores" for cores, lanes in of_cores.items())
+        print(f"  {group.job.sweep.name}: {told}")

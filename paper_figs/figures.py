@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import pandas as pd
 import xarray as xr
@@ -12,6 +13,7 @@ from matplotlib.figure import Figure
 
 from paper_figs.claims.results import AXES
 from paper_figs.plots import curves, points
+from sweeps.results import store
 
 
 @dataclass(frozen=True)
@@ -27,7 +29,16 @@ class PaperFigure:
     """Results and slots per episode to plotted numbers."""
     draw: Callable[[pd.DataFrame, str], Figure]
     """Plotted numbers and title to picture."""
+    learners: tuple[str, ...] = ()
+    """Which of the sweep's it shows; all if empty."""
 
+    def results(self, folder: Path, seeds: int) -> xr.Dataset:
+        """What it shows of results in a folder of sweeps, in memory; see `store.load`."""
+        data = store.load(folder / self.name, seeds)
+        return data.sel(algorithm=list(self.learners)) if self.learners else data
+
+
+_OF_POINTS = ("tlwd", "dpr", "ddqn")
 
 FIGURES = (
     PaperFigure(
@@ -50,6 +61,7 @@ FIGURES = (
         title="Fig. 6: event probability at high speed",
         table=lambda data, slots: points.table(data, "6", AXES["fig6"].coordinate, slots),
         draw=functools.partial(points.draw, x_label="$p_1^v$"),
+        learners=_OF_POINTS,
     ),
     PaperFigure(
         name="fig7",
@@ -57,6 +69,7 @@ FIGURES = (
         title="Fig. 7: probability of favourable conditions",
         table=lambda data, slots: points.table(data, "7", AXES["fig7"].coordinate, slots),
         draw=functools.partial(points.draw, x_label=r"$\tau_0$ of all factors"),
+        learners=_OF_POINTS,
     ),
     PaperFigure(
         name="fig8",
@@ -64,6 +77,7 @@ FIGURES = (
         title="Fig. 8: traffic density",
         table=lambda data, slots: points.table(data, "8", AXES["fig8"].coordinate, slots),
         draw=functools.partial(points.draw, x_label=r"$\omega$ (objects per 45 m $\times$ 45 m)"),
+        learners=_OF_POINTS,
     ),
     PaperFigure(
         name="fig9",
@@ -71,6 +85,7 @@ FIGURES = (
         title="Fig. 9: TLwD in the target",
         table=lambda data, slots: curves.table(data, figure="9", panel="", points={"tlwd": 0, "tlwd_uniform": 1}),
         draw=curves.draw,
+        learners=("tlwd",),
     ),
 )
 NUMBERS = tuple(sorted({figure.number for figure in FIGURES}))

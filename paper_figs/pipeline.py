@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
-from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, field
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import NamedTuple
 
 import pandas as pd
 import xarray as xr
@@ -24,7 +23,8 @@ from paper_figs.figures import FIGURES, NUMBERS, PaperFigure
 from paper_figs.plots import front as front_plot
 from paper_figs.plots import style
 from sweeps.engine.estimate import in_words
-from sweeps.engine.run import compile_ahead, expected_seconds, run_sweep
+from sweeps.engine.plan import expected_seconds, plan
+from sweeps.engine.run import run_together
 from sweeps.preset import environment_of, label_of, slots_of
 from sweeps.results import store
 from sweeps.studies.registry import SWEEPS
@@ -48,13 +48,14 @@ def chosen(numbers: tuple[int, ...]) -> list[PaperFigure]:
     return [figure for figure in FIGURES if not numbers or figure.number in numbers]
 
 
-@dataclass
-class _Written:
-    """What has been written of all figures, and what the files about all of them need."""
+class _Drawn(NamedTuple):
+    """A figure that has been written, and what the files about all of them need of it."""
 
-    files: list[Path] = field(default_factory=list)
-    pictures: dict[str, Path] = field(default_factory=dict)
-    manifests: dict[str, str] = field(default_factory=dict)
+    results: xr.Dataset
+    manifest: str
+    files: list[Path]
+    pictures: dict[str, Path]
+    """PNG files by title."""
 
 
 def make_figures(
@@ -65,61 +66,56 @@ def make_figures(
     Raises:
       ValueError: unknown figures, bad sizes, a bad delta, or results of another configuration in `out`.
     """
-    wanted = chosen(numbers)
+    wanted = {figure.name: figure for figure in chosen(numbers)}
     size.check()
     rules = Rules(delta=delta or Delta())
     rules.delta.check()
     out.mkdir(parents=True, exist_ok=True)
     folder = results_folder(out, size)
-    sweeps = [SWEEPS[figure.name] for figure in wanted]
-    written, results, slots = _Written(), {}, slots_of(size.preset)
-    drawn: list[Future] = []
-    # A single thread draws, since matplotlib's settings are global, while the next figure's sweep runs.
-    with ThreadPoolExecutor(1, "drawing") as drawing, contextlib.closing(compile_ahead(sweeps, size, folder)) as ahead:
-        seconds = expected_seconds(sweeps, size, folder)
-        console.print(
-            f"figures: {len(wanted)}, seeds: {size.seeds}, episodes: {size.episodes}; "
-            f"about {in_words(seconds)} in all, and what has to be compiled"
-        )
-        for figure in wanted:
-            found = run_sweep(SWEEPS[figure.name], size, folder, console, resume=True, ahead=ahead)
-            results[figure.name] = store.load(found, size.seeds)
-            drawn.append(drawing.submit(_write_figure, figure, results[figure.name], slots, out, written))
-            written.manifests[figure.name] = (found / store.MANIFEST).read_text(encoding="utf-8")
-            if figure.name == "fig5b":
-                drawn.append(drawing.submit(_write_front, results[figure.name], size, out, written))
-        for each in drawn:
-            each.result()
-    _write_tables(results, slots, out, written)
-    _write_verdicts(results, rules, size, out, written)
-    return written.files
+    sweeps = [SWEEPS[name] for name in wanted]
+    seconds = expected_seconds(plan(sweeps, size, folder), folder)
+    console.print(
+        f"figures: {len(wanted)}, seeds: {size.seeds}, episodes: {size.episodes}; "
+        f"about {in_words(seconds)} in all, and what has to be compiled"
+    )
+    # A single thread draws, since matplotlib's settings are global, while what is left is run.
+    with ThreadPoolExecutor(1, "drawing") as drawing:
+        drawing_of = {
+            sweep.name: drawing.submit(_draw, wanted[sweep.name], folder, size, out)
+            for sweep in run_together(sweeps, size, folder, console)
+        }
+    drawn = {name: drawing_of[name].result() for name in wanted}
+    return [
+        *(file for each in drawn.values() for file in each.files),
+        *_write_tables({name: each.results for name, each in drawn.items()}, size, out),
+        *_write_verdicts(drawn, rules, size, out),
+    ]
 
 
-def _write_figure(figure: PaperFigure, data: xr.Dataset, slots: int, out: Path, written: _Written) -> None:
-    table = figure.table(data, slots)
-    _write(table, figure.draw(table, figure.title), figure.name, figure.title, out, written)
+def _draw(figure: PaperFigure, folder: Path, size: Size, out: Path) -> _Drawn:
+    """Writes a figure; with Fig. 5(b) what policies can reach in the target, which is no figure of the paper."""
+    data = figure.results(folder, size.seeds)
+    table = figure.table(data, slots_of(size.preset))
+    written = {figure.title: _write(table, figure.draw(table, figure.title), out / figure.name)}
+    if figure.name == "fig5b":
+        table = front.table(environment_of("target", size.preset), data)
+        written[front.TITLE] = _write(table, front_plot.draw(table, front.TITLE), out / front.NAME)
+    files = [file for of_one in written.values() for file in of_one]
+    manifest = (folder / figure.name / store.MANIFEST).read_text(encoding="utf-8")
+    return _Drawn(data, manifest, files, {title: of_one[-1] for title, of_one in written.items()})
 
 
-def _write_front(data: xr.Dataset, size: Size, out: Path, written: _Written) -> None:
-    """What policies can reach in the target, with its learners; no figure of the paper."""
-    table = front.table(environment_of("target", size.preset), data)
-    _write(table, front_plot.draw(table, front.TITLE), front.NAME, front.TITLE, out, written)
+def _write(table: pd.DataFrame, picture: Figure, stem: Path) -> list[Path]:
+    return [style.save_table(table, stem.with_suffix(".csv")), *style.save(picture, stem)]
 
 
-def _write(table: pd.DataFrame, picture: Figure, name: str, title: str, out: Path, written: _Written) -> None:
-    path = style.save_table(table, out / f"{name}.csv")
-    files = style.save(picture, out / name)
-    written.files += [path, *files]
-    written.pictures[title] = files[-1]
-
-
-def _write_tables(results: dict[str, xr.Dataset], slots: int, out: Path, written: _Written) -> None:
+def _write_tables(results: dict[str, xr.Dataset], size: Size, out: Path) -> list[Path]:
+    slots = slots_of(size.preset)
     tables = {
         "regret": [regret.table(data, name, slots) for name, data in results.items()],
         "seeds_needed": [ranking.needed_table(data, name) for name, data in results.items()],
     }
-    for name, parts in tables.items():
-        written.files.append(style.save_table(pd.concat(parts), out / f"{name}.csv"))
+    return [style.save_table(pd.concat(parts), out / f"{name}.csv") for name, parts in tables.items()]
 
 
 def judgements_of(results: dict[str, xr.Dataset], rules: Rules | None = None) -> list[Judgement]:
@@ -127,11 +123,13 @@ def judgements_of(results: dict[str, xr.Dataset], rules: Rules | None = None) ->
     return [judgement for judgement in claims_of(results, rules) if judgement.n_seeds]
 
 
-def _write_verdicts(results: dict[str, xr.Dataset], rules: Rules, size: Size, out: Path, written: _Written) -> None:
+def _write_verdicts(drawn: dict[str, _Drawn], rules: Rules, size: Size, out: Path) -> list[Path]:
+    results = {name: each.results for name, each in drawn.items()}
     judgements = judgements_of(results, rules)
     optima = [row for name, data in results.items() for row in report.optimum_rows(name, data)]
     diverged = [row for name, data in results.items() for row in divergence.rows(name, data)]
-    page = report.render(size, written.pictures, judgements, optima, diverged, written.manifests)
+    pictures = {title: path for each in drawn.values() for title, path in each.pictures.items()}
+    manifests = {name: each.manifest for name, each in drawn.items()}
+    page = report.render(size, pictures, judgements, optima, diverged, manifests)
     claims = json.dumps(as_json(judgements), indent=2, allow_nan=False) + "\n"
-    for name, text in {"claims.json": claims, "report.html": page}.items():
-        written.files.append(write_text(out / name, text))
+    return [write_text(out / name, text) for name, text in {"claims.json": claims, "report.html": page}.items()]

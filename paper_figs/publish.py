@@ -89,7 +89,7 @@ def publish_figures(out: Path, target: Path, preset: str = Size.preset) -> list[
         manifest = folder / name / store.MANIFEST
         written.append(Path(shutil.copyfile(manifest, target / f"{name}.manifest.json")))
     n_seeds = json.loads((out / "claims.json").read_text(encoding="utf-8"))[0]["n_seeds"]
-    results = {figure.name: store.load(folder / figure.name, n_seeds) for figure in FIGURES}
+    results = {figure.name: figure.results(folder, n_seeds) for figure in FIGURES}
     numbers = target / "numbers.json"
     write_text(numbers, json.dumps(numbers_of(results), indent=2, allow_nan=False) + "\n")
     return [*written, numbers]

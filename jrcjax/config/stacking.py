@@ -49,6 +49,19 @@ def stacked(base: Points, columns: Sequence[Values], number: int) -> Points:
     return jax.device_put(points)  # unlike jnp.asarray it compiles nothing for each shape
 
 
+def changes(base: Points, column: Values) -> np.ndarray:
+    """Which of the values of a column change the base, [points]; those of a setting are taken to."""
+    number, parameter = len(column.at), column.parameter
+    if parameter.container == "config":
+        return ~np.isnan(column.at)
+    found = np.zeros(number, bool)
+    for entry in parameter.entries:
+        leaf = np.asarray(leaf_of(getattr(base, parameter.container), entry))
+        changed = _changed(np.broadcast_to(leaf, (number, *leaf.shape)), entry, column.at)
+        found |= (changed != leaf).reshape(number, -1).any(axis=1)
+    return found
+
+
 def shapes(base: Points, columns: Sequence[Values], number: int) -> Points:
     """Shapes and types of `stacked`, without the banks of placements, which take seconds to draw."""
     of_radar = [c for c in columns if _is_of_radar(c)]

@@ -134,8 +134,12 @@ def devices_for(count: int, block: int | None = None, available: int | None = No
       available: devices, those of this process if None.
     """
     blocks, available = -(-count // (block or block_for(count))), available or jax.device_count()
-    rounds = -(-blocks // available)
-    return min(max(-(-blocks // rounds), 2), available)
+    return min(max(-(-blocks // rounds_for(count, block, available)), 2), available)
+
+
+def rounds_for(count: int, block: int | None = None, available: int | None = None) -> int:
+    """Blocks that the busiest device advances one after the other; the arguments are those of `devices_for`."""
+    return -(-count // ((block or block_for(count)) * (available or jax.device_count())))
 
 
 def padded(count: int, block: int | None = None, available: int | None = None) -> int:

@@ -22,6 +22,8 @@ from sweeps.engine.job import Job
 from sweeps.engine.program import Chunk, advance, joined
 from sweeps.results import store
 
+_WEIGHTS, _DEMONSTRATION = "weights_", "demonstration_"  # what names of variables begin with
+
 
 class Block(NamedTuple):
     """The outcome of some seeds of a job."""
@@ -105,7 +107,7 @@ def hand_on(spec: Spec, config: Config) -> Callable:
 def _variables(source: Source) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
     """A source as named arrays: weights by their path, demonstrations by their field."""
     arrays: dict[str, tuple[tuple[str, ...], np.ndarray]] = {
-        f"demonstration_{name}": (("point", "seed", "transition"), np.asarray(field))
+        f"{_DEMONSTRATION}{name}": (("point", "seed", "transition"), np.asarray(field))
         for name, field in source.demonstrations._asdict().items()
     }
     for path, leaf in jax.tree_util.tree_leaves_with_path(source.weights):
@@ -115,7 +117,12 @@ def _variables(source: Source) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
 
 
 def _weights_name(path: Any) -> str:
-    return "weights_" + "_".join(str(part.key) for part in path)
+    return _WEIGHTS + "_".join(str(part.key) for part in path)
+
+
+def handed_on(name: str) -> bool:
+    """Whether a variable of results is part of what source agents hand on."""
+    return name.startswith((_WEIGHTS, _DEMONSTRATION))
 
 
 def source_in(job: Job, results: xr.Dataset) -> Source:
@@ -125,5 +132,5 @@ def source_in(job: Job, results: xr.Dataset) -> Source:
     weights = [
         jax.device_put(results[_weights_name(path)].values) for path, _ in jax.tree_util.tree_leaves_with_path(like)
     ]
-    fields = (jax.device_put(results[f"demonstration_{name}"].values) for name in NStepTransition._fields)
+    fields = (jax.device_put(results[f"{_DEMONSTRATION}{name}"].values) for name in NStepTransition._fields)
     return Source(jax.tree.unflatten(jax.tree.structure(like), weights), NStepTransition(*fields))

@@ -47,7 +47,7 @@ class Job:
 
     sweep: Sweep
     size: Size
-    """Its number of seeds says nothing here."""
+    """Its number of seeds says how many are wanted, and nothing of what they give."""
 
     @cached_property
     def columns(self) -> list[Values]:
@@ -154,6 +154,6 @@ def _table(environment: str, design: Design, fixed: tuple[tuple[str, float], ...
 
 
 def _rows(number: int) -> np.ndarray:
-    """Which of so many points each row of a table holds; a single one is shared by all lanes."""
-    room = max(_LEAST_ROOM, 2 ** (number - 1).bit_length()) if number > 1 else 1
+    """Which of so many points each row of a table holds."""
+    room = max(_LEAST_ROOM, 2 ** (number - 1).bit_length())
     return np.minimum(np.arange(room), number - 1)

@@ -81,8 +81,7 @@ def program_of(learners: tuple[str, ...], spec: Spec, config: Config, chunk: int
     rules = {name: make_learner(name, spec, config) for name in learners}
 
     def at(points: Points, point) -> Points:
-        # A single point is shared by all lanes, and its bank of placements with it.
-        return jax.tree.map(lambda a: a[0] if a.shape[0] == 1 else a[point], points)
+        return jax.tree.map(lambda a: a[point], points)
 
     def start(points, lane):
         key, source, point = lane

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import contextlib
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from rich.console import Console
 
@@ -16,60 +17,13 @@ from sweeps.engine import estimate, pace
 from sweeps.engine.ahead import Ahead
 from sweeps.engine.block import Block, block_of
 from sweeps.engine.job import Job
+from sweeps.engine.plan import compile_ahead, expected_seconds, lacking, plan, to_do
 from sweeps.engine.program import Chunk, advance
-from sweeps.engine.sources import missing_sources, sources_of
+from sweeps.engine.sources import sources_of
+from sweeps.engine.together import Together, together
 from sweeps.results import store
 from sweeps.results.agents import check_agents, write_agents
 from sweeps.sweep import Size, Sweep
-
-
-def blocks(wanted: int, finished: set[int], per_part: int) -> Iterator[range]:
-    """Blocks of consecutive seeds that are still to be run, none across a multiple of `per_part`."""
-    seed = 0
-    while seed < wanted:
-        if seed in finished:
-            seed += 1
-            continue
-        stop = seed + 1
-        while stop < wanted and stop % per_part and stop not in finished:
-            stop += 1
-        yield range(seed, stop)
-        seed = stop
-
-
-def to_do(job: Job, out: Path) -> list[range]:
-    """The blocks of a job that are still to be run.
-
-    Raises:
-      ConfigurationMismatch: if there are results of another configuration.
-    """
-    folder = out / job.sweep.name
-    store.check_folder(folder, job)
-    return list(blocks(job.size.seeds, store.finished_seeds(folder), job.sweep.seeds_per_part))
-
-
-def lacking(sweeps: list[Sweep], size: Size, out: Path) -> list[tuple[Job, range]]:
-    """Blocks that these sweeps lack in `out`, as they are run, each behind the source agents that it lacks."""
-    found: dict[tuple[Sweep, range], Job] = {}
-    for job in [Job(sweep, size) for sweep in sweeps]:
-        for seeds in to_do(job, out):
-            if job.source and (missing := missing_sources(job.source, seeds, out)):
-                found.setdefault((job.source.sweep, missing), job.source)
-            found[job.sweep, seeds] = job
-    return [(job, seeds) for (_, seeds), job in found.items()]
-
-
-def expected_seconds(sweeps: list[Sweep], size: Size, out: Path) -> float:
-    """What these sweeps will take, with the source agents that they lack, as far as one can tell beforehand."""
-    return sum(estimate.block_seconds(job, len(seeds)) for job, seeds in lacking(sweeps, size, out))
-
-
-def compile_ahead(sweeps: list[Sweep], size: Size, out: Path) -> Ahead:
-    """Begins to compile, in threads, what these sweeps lack in `out`, in their order; for `run_sweep`."""
-    first: dict[Sweep, tuple[Job, range]] = {}
-    for job, seeds in lacking(sweeps, size, out):
-        first.setdefault(job.sweep, (job, seeds))
-    return Ahead(first.values())
 
 
 def run_sweep(
@@ -82,7 +36,6 @@ def run_sweep(
     save_agents: bool = False,
     client: Any = None,
     patience: float = 300.0,
-    ahead: Ahead | None = None,
 ) -> Path:
     """Runs what is missing of a sweep.
 
@@ -95,7 +48,6 @@ def run_sweep(
       save_agents: save the trained agents beside the results.
       client: of the Dask cluster that computes (see `sweeps.engine.distributed`); this process if None.
       patience: seconds to wait for workers of a cluster that has none.
-      ahead: what compiles the sweep's programs already, see `compile_ahead`.
 
     Returns:
       The folder with the results.
@@ -109,38 +61,88 @@ def run_sweep(
     size.check()
     job, folder = Job(sweep, size), out / sweep.name
     job.check()
-    todo = to_do(job, out)
-    finished = size.seeds - sum(map(len, todo))
+    finished = size.seeds - len(lacking(job, out))
     if finished and not resume:
         raise ValueError(f"{folder} holds results of {finished} seeds already; add --resume, or choose another --out")
     if save_agents:
         check_agents(folder, job)
-    if not todo:
-        console.print(f"{sweep.name}: all {size.seeds} seeds are there, in {folder}")
-        store.write_manifest(folder)
+    if finished == size.seeds:
+        _say_all_there(job, folder, console)
         return folder
-    seconds = expected_seconds([sweep], size, out)
-    console.print(_announcement(job, todo, seconds))
-    with files.locked(folder):
-        try:
-            if client is None:
-                _run_here(job, out, console, seconds, save_agents, ahead)
-            else:
-                _run_on_cluster(client, job, out, console, save_agents, patience)
-        except (KeyboardInterrupt, OSError):
-            saved = store.in_words(store.finished_seeds(folder))
-            held = f"seeds {saved}" if saved else "nothing yet"
-            console.print(f"{sweep.name}: stopped; saved in {folder}: {held}", soft_wrap=True)
-            raise
+    seconds = expected_seconds(plan([sweep], size, out), out)
+    _run(together([job]), out, console, seconds, _How(save_agents, client, patience))
     return folder
 
 
-def save(block: Block, job: Job, out: Path, save_agents: bool) -> None:
-    """Keeps a block: its agents if they are wanted, then its part."""
-    folder = out / job.sweep.name
-    if save_agents:
-        write_agents(folder, job, block.seeds, block.agents)
-    store.add_part(folder, block.seeds, block.results)
+def run_together(sweeps: Sequence[Sweep], size: Size, out: Path, console: Console) -> Iterator[Sweep]:
+    """Runs what is missing of some sweeps, in groups that one program serves, while it compiles what comes next.
+
+    Args:
+      sweeps: what to run.
+      size: how much of it.
+      out: results of each sweep go to a folder here, source agents to that of its source.
+      console: where the expected time and the progress are shown.
+
+    Yields:
+      Each of the sweeps as soon as all of its results are there.
+
+    Raises:
+      ValueError: more than this machine can hold, or results of another configuration in `out`.
+      FolderInUse: if another process writes to one of the folders.
+    """
+    groups = plan(sweeps, size, out)
+    waiting = {member.job.sweep for group in groups for member in group.members}
+    with contextlib.closing(compile_ahead(groups, out)) as ahead:
+        for sweep in sweeps:
+            if sweep not in waiting:
+                _say_all_there(Job(sweep, size), out / sweep.name, console)
+                yield sweep
+        for group in groups:
+            group.job.check()
+            _run(group, out, console, expected_seconds([group], out), _How(ahead=ahead))
+            yield from (member.job.sweep for member in group.members if member.job.sweep in sweeps)
+
+
+def _say_all_there(job: Job, folder: Path, console: Console) -> None:
+    console.print(f"{job.sweep.name}: all {job.size.seeds} seeds are there, in {folder}")
+    store.write_manifest(folder)  # which a killed process may not have come to
+
+
+class _How(NamedTuple):
+    """How a group is run; see `run_sweep`."""
+
+    save_agents: bool = False
+    client: Any = None
+    patience: float = 300.0
+    ahead: Ahead | None = None
+
+
+def _run(group: Together, out: Path, console: Console, seconds: float, how: _How) -> None:
+    console.print(_announcement(group.job, sum(map(len, to_do(group, out))), seconds))
+    folders = [out / member.job.sweep.name for member in group.members]
+    with contextlib.ExitStack() as locks:
+        for folder in folders:
+            locks.enter_context(files.locked(folder))
+        try:
+            if how.client is None:
+                _run_here(group, out, console, seconds, how)
+            else:
+                _run_on_cluster(group, out, console, how)
+        except (KeyboardInterrupt, OSError):
+            for folder in folders:
+                saved = store.in_words(store.finished_seeds(folder))
+                held = f"seeds {saved}" if saved else "nothing yet"
+                console.print(f"{folder.name}: stopped; saved in {folder}: {held}", soft_wrap=True)
+            raise
+
+
+def save(block: Block, group: Together, out: Path, save_agents: bool) -> None:
+    """Keeps a block: of each sweep its agents if they are wanted, then its part."""
+    for member in group.members:
+        folder = out / member.job.sweep.name
+        if save_agents:
+            write_agents(folder, member.job, block.seeds, group.agents_of(member, block.agents))
+        store.add_part(folder, block.seeds, group.results_of(member, block.results))
 
 
 class _Shown:
@@ -172,30 +174,30 @@ class _Shown:
             self.stopwatch.start()
 
 
-def _run_here(job: Job, out: Path, console: Console, seconds: float, save_agents: bool, ahead: Ahead | None) -> None:
+def _run_here(group: Together, out: Path, console: Console, seconds: float, how: _How) -> None:
     """Runs what is missing, as it is now that nobody else writes, and shows the progress of so many seconds."""
+    job = group.job
     with progress.shown(console, job.sweep.name, seconds) as told:
-        shown = _Shown(told, ahead)
-        for seeds in to_do(job, out):
+        shown = _Shown(told, how.ahead)
+        for seeds in to_do(group, out):
             source = sources_of(job.source, seeds, out, shown.compute) if job.source else None
-            save(shown.compute(job, seeds, source), job, out, save_agents)
+            save(shown.compute(job, seeds, source), group, out, how.save_agents)
         shown.stopwatch.keep()
 
 
-def _run_on_cluster(client: Any, job: Job, out: Path, console: Console, save_agents: bool, patience: float) -> None:
+def _run_on_cluster(group: Together, out: Path, console: Console, how: _How) -> None:
     """The same on a cluster; the progress counts seeds, over all workers."""
     from sweeps.engine import distributed  # which needs an extra
 
-    todo = to_do(job, out)
+    job, todo = group.job, to_do(group, out)
     with progress.shown(console, f"{job.sweep.name} on a cluster", sum(map(len, todo))) as told:
-        for block in distributed.compute_blocks(client, job, out, todo, patience):
-            save(block, job, out, save_agents)
+        for block in distributed.compute_blocks(how.client, job, out, todo, how.patience):
+            save(block, group, out, how.save_agents)
             told(len(block.seeds))
 
 
-def _announcement(job: Job, todo: list[range], seconds: float) -> str:
-    points, seeds = len(job.sweep.design), sum(map(len, todo))
-    agents = points * seeds * len(job.sweep.learners)
+def _announcement(job: Job, seeds: int, seconds: float) -> str:
+    agents = len(job.sweep.design) * seeds * len(job.sweep.learners)
     programs = f" in {len(job.groups)} programs" if len(job.groups) > 1 else ""
     return (
         f"{job.sweep.name}: {agents} agents (points x seeds x learners){programs}, {job.size.episodes} episodes each; "

@@ -22,8 +22,8 @@ from sweeps.results.configuration import configuration, coordinates, differing, 
 from sweeps.results.parts import Part, finished_seeds, part_path, parts_of, read_part, write_part
 
 __all__ = [
-    "MANIFEST", "ConfigurationMismatch", "add_part", "check_configuration", "check_folder", "configuration", "dataset",
-    "finished_seeds", "load", "part_path", "sweep_of", "write_manifest", "write_part",
+    "MANIFEST", "ConfigurationMismatch", "about", "add_part", "check_configuration", "check_folder", "configuration",
+    "dataset", "finished_seeds", "load", "part_path", "points_of", "sweep_of", "write_manifest", "write_part",
 ]  # fmt: skip
 
 MANIFEST = "manifest.json"
@@ -79,13 +79,23 @@ def dataset(job: Job, seeds: range, log: dict[str, Log]) -> xr.Dataset:
         variables |= {f"{policy}_{name}": (("point", "episode")[: v.ndim], v) for name, v in values.items()}
     coords = {
         "algorithm": list(learners),
-        "point": np.arange(len(job.sweep.design)),
-        **{name: ("point", values) for name, values in coordinates(job).items()},
+        **points_of(job),
         "seed": np.array(seeds),
         "episode": np.arange(1, job.size.episodes + 1),
     }
-    about = {"configuration": configuration(job), "provenance": provenance()}
-    return xr.Dataset(variables, coords, {name: json.dumps(value, sort_keys=True) for name, value in about.items()})
+    return xr.Dataset(variables, coords, about(job))
+
+
+def points_of(job: Job) -> dict[str, Any]:
+    """The coordinates of a job's points: their numbers, and what varies between them."""
+    varies = {name: ("point", values) for name, values in coordinates(job).items()}
+    return {"point": np.arange(len(job.sweep.design)), **varies}
+
+
+def about(job: Job) -> dict[str, str]:
+    """What a part says of itself: the configuration of its job, and where it comes from."""
+    said = {"configuration": configuration(job), "provenance": provenance()}
+    return {name: json.dumps(value, sort_keys=True) for name, value in said.items()}
 
 
 def add_part(folder: Path, seeds: range, data: xr.Dataset) -> None:

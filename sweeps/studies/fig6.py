@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from jrcjax.training.transfer import TARGET_LEARNERS
 from sweeps.design import along
 from sweeps.studies.source import SOURCE
 from sweeps.sweep import Sweep
 
 FIG6 = Sweep(
     name="fig6",
-    description="reward, throughput and miss detection against p_1^v: TLwD, DPR, DDQN",
-    learners=("tlwd", "dpr", "ddqn"),
+    description="reward, throughput and miss detection against p_1^v: the learners of Fig. 5(b)",
+    learners=TARGET_LEARNERS,
     design=along(
         "high_speed_event_probability",
         "env.speed.event_probability.high",

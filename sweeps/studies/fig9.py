@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from jrcjax.training.transfer import TARGET_LEARNERS
 from sweeps.design import table
 from sweeps.studies.source import SOURCE
 from sweeps.sweep import Sweep
@@ -20,8 +21,8 @@ UNIFORM = {"prioritised": 0.0, "priority_exponent": 0.0, "importance_start": 0.0
 
 FIG9 = Sweep(
     name="fig9",
-    description="learning curves of TLwD in the target environment, prioritised replay against uniform",
-    learners=("tlwd",),
+    description="learning curves in the target environment, with prioritised replay for TLwD and with uniform",
+    learners=TARGET_LEARNERS,
     design=table((PRIORITISED, UNIFORM), PATHS),
     source=SOURCE,
 )

@@ -22,8 +22,9 @@ from jrcjax.training.transfer import target_key
 from sweeps.__main__ import main
 from sweeps.design import Column, Design, along
 from sweeps.engine.job import Job
+from sweeps.engine.plan import blocks, compile_ahead, expected_seconds, plan
 from sweeps.engine.program import chunk_of, joined
-from sweeps.engine.run import blocks, compile_ahead, expected_seconds, run_sweep
+from sweeps.engine.run import run_sweep, run_together
 from sweeps.engine.sources import missing_sources, sources_of
 from sweeps.results import store
 from sweeps.results.configuration import configuration, digest_of
@@ -327,13 +328,14 @@ def test_a_transfer_sweep_compiles_once_for_all_blocks_and_that_ahead_of_them(tm
     size = replace(TINY, seeds=2 * FIG5A.seeds_per_part, episodes=1, pretraining=3)
     sweep = replace(PAIR, learners=("tlwd", "dpr"))
     again = replace(sweep, name="again", design=along(_P, _P, (0.2, 0.4, 0.6)))  # a program serves any few points
-    with compilations() as compiled, contextlib.closing(compile_ahead([FIG5A, sweep, again], size, tmp_path)) as ahead:
-        for each in (FIG5A, SOURCE, sweep, again):
-            ahead.wait(each)
+    groups = plan([FIG5A, sweep], size, tmp_path)
+    with compilations() as compiled, contextlib.closing(compile_ahead(groups, tmp_path)) as ahead:
+        for group in groups:
+            ahead.wait(group.job.sweep)
         # Source agents start and advance like those of Fig. 5(a), and demonstrate; the sweep's start and advance.
         assert compiled.count("jit(checked)") == 5
-        for each in (FIG5A, sweep, again):
-            run_sweep(each, size, tmp_path, QUIET, resume=False, ahead=ahead)
+        assert list(run_together([FIG5A, sweep], size, tmp_path, QUIET)) == [FIG5A, sweep]
+        run_sweep(again, size, tmp_path, QUIET, resume=False)
     assert compiled.count("jit(checked)") == 5
 
 
@@ -362,11 +364,15 @@ def test_points_are_what_the_paper_varies(name):
     assert (sweep.source is None) == (name == "fig5a")
 
 
+def seconds(sweeps, size, out):
+    return expected_seconds(plan(sweeps, size, out), out)
+
+
 def test_the_expected_time_grows_with_the_work_and_is_nothing_for_nothing(tmp_path):
-    one, more = (expected_seconds([FIG5A], Size(seeds=10, episodes=e), tmp_path) for e in (100, 300))
+    one, more = (seconds([FIG5A], Size(seeds=10, episodes=e), tmp_path) for e in (100, 300))
     np.testing.assert_allclose(more, 3 * one)
-    assert expected_seconds([SWEEPS["fig6"]], Size(), tmp_path) > expected_seconds([SWEEPS["fig5b"]], Size(), tmp_path)
-    assert expected_seconds([], Size(), tmp_path) == 0
+    assert seconds([SWEEPS["fig6"]], Size(), tmp_path) > seconds([SWEEPS["fig5b"]], Size(), tmp_path)
+    assert seconds([], Size(), tmp_path) == 0
 
 
 def test_the_expected_time_is_told_before_and_counts_what_is_there(tmp_path):
@@ -374,4 +380,4 @@ def test_the_expected_time_is_told_before_and_counts_what_is_there(tmp_path):
     run_sweep(FIG5A, Size(seeds=2, episodes=2), tmp_path, QUIET, resume=False)
     run_sweep(FIG5A, Size(seeds=3, episodes=2), tmp_path, console, resume=True)
     assert "fig5a: 3 agents (points x seeds x learners), 2 episodes each; expected 0 s" in console.export_text()
-    assert expected_seconds([FIG5A], Size(seeds=3, episodes=2), tmp_path) == 0
+    assert seconds([FIG5A], Size(seeds=3, episodes=2), tmp_path) == 0
