@@ -39,7 +39,7 @@ jax.block_until_ready(jax.jit(train)(key, params))
 """,
 }
 """What a process runs, all of which counts."""
-_SWEEPS = ("fig5b", "fig5a", "fig6", "fig7", "fig8", "fig9")
+_SWEEPS = ("fig5b", "fig5a")  # whose programs serve all other figures
 _SWEEP = """
 import sys, time
 from jrcjax.training import parallel

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import tyro
 
+from jrcjax.model.presets import ENVIRONMENTS
 from paper_figs.claims.delta import Delta
 from sweeps import interrupts
 from sweeps.command import begin
 from sweeps.options import FLAGS, Count, Counts, Folder, Preset
-from sweeps.preset import preset_of
+from sweeps.preset import base_of, preset_of
 from sweeps.sweep import size_of
 
 
@@ -45,8 +47,12 @@ def main(args: list[str] | None = None) -> int:
         console = begin()
         size = size_of(options.seeds, options.episodes, preset_of(options.preset), options.smoke)
         with interrupts.terminable():
-            from paper_figs.pipeline import make_figures
-
+            # What imports take is enough to draw the placements of both environments.
+            with ThreadPoolExecutor(len(ENVIRONMENTS), "placements") as drawing:
+                bases = [drawing.submit(base_of, name, size.preset) for name in ENVIRONMENTS]
+                from paper_figs.pipeline import make_figures
+            for base in bases:
+                base.result()
             written = make_figures(options.only, size, out, console, options.delta)
     except KeyboardInterrupt:
         print(interrupts.how_to_go_on(), file=sys.stderr)

@@ -96,14 +96,9 @@ def learner_rows(params: EnvParams, data: xr.Dataset) -> list[tuple]:
     return rows
 
 
-def table(params: EnvParams, data: xr.Dataset) -> pd.DataFrame:
-    """The plotted numbers.
-
-    Args:
-      params: the target environment.
-      data: results of the learners there, those of Fig. 5(b), in the convention of `params`.
-    """
-    rows = learner_rows(params, data)
+def exact_rows(params: EnvParams) -> list[tuple]:
+    """All numbers but the learners'."""
+    rows = []
     for target in _conventions(params):
         rows += [*front_rows("a", target), *reward_rows(target), random_row(target)]
     point = Points(params, HParams())
@@ -112,6 +107,18 @@ def table(params: EnvParams, data: xr.Dataset) -> pd.DataFrame:
         for value in values:
             for moved in _conventions(with_value(point, varied, value).params):
                 rows += front_rows(panel, moved, value)
+    return rows
+
+
+def table(params: EnvParams, data: xr.Dataset, exact: list[tuple] | None = None) -> pd.DataFrame:
+    """The plotted numbers.
+
+    Args:
+      params: the target environment.
+      data: results of the learners there, those of Fig. 5(b), in the convention of `params`.
+      exact: `exact_rows` of this environment, if they are known.
+    """
+    rows = [*learner_rows(params, data), *(exact_rows(params) if exact is None else exact)]
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
