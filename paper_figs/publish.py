@@ -36,7 +36,7 @@ ROOT = Path(__file__).parents[1]
 TABLES = ("claims.json", "regret.csv", "seeds_needed.csv")
 STUDIES = ("robustness", "multiverse", "reconstruction")
 """Whose summaries are published as they are."""
-_OUT = re.compile(r" --out [^ \"]+")  # of a command in a manifest
+_OUT = re.compile(r" --out [^ \"]+")  # of a command in a manifest: where results lay on the machine that made them
 _TEXTS = ("*.md", "paper_figs/*.md", "docs/**/*.md")
 
 
@@ -86,8 +86,8 @@ def publish_figures(out: Path, target: Path, preset: str = Size.preset) -> list[
     copies += [out / f"{name}{suffix}" for name in names for suffix in (".pdf", ".png", ".csv")]
     written = [Path(shutil.copyfile(path, target / path.name)) for path in copies]
     for name in (*(figure.name for figure in FIGURES), "source"):
-        manifest = folder / name / store.MANIFEST
-        written.append(Path(shutil.copyfile(manifest, target / f"{name}.manifest.json")))
+        manifest = (folder / name / store.MANIFEST).read_text(encoding="utf-8")
+        written.append(write_text(target / f"{name}.manifest.json", _OUT.sub("", manifest)))
     n_seeds = json.loads((out / "claims.json").read_text(encoding="utf-8"))[0]["n_seeds"]
     results = {figure.name: figure.results(folder, n_seeds) for figure in FIGURES}
     numbers = target / "numbers.json"
@@ -96,7 +96,7 @@ def publish_figures(out: Path, target: Path, preset: str = Size.preset) -> list[
 
 
 def publish_study(summary: Path, target: Path) -> Path:
-    """Copies a study's summary; where results lay on the machine that made them stays there."""
+    """Copies a study's summary."""
     shutil.copytree(summary, target, dirs_exist_ok=True)
     manifests = target / "manifests.json"
     if manifests.is_file():
