@@ -75,4 +75,4 @@ def expected_seconds(groups: Iterable[Together], out: Path) -> float:
 
 def compile_ahead(groups: Iterable[Together], out: Path) -> Ahead:
     """Begins to compile, in threads, what these groups need, in their order; for `run_together`."""
-    return Ahead((group.job, to_do(group, out)[0]) for group in groups)
+    return Ahead((group.job, todo[0]) for group in groups if (todo := to_do(group, out)))

@@ -19,7 +19,7 @@ from sweeps.engine.block import Block, block_of
 from sweeps.engine.job import Job
 from sweeps.engine.plan import compile_ahead, expected_seconds, lacking, plan, to_do
 from sweeps.engine.program import Chunk, advance
-from sweeps.engine.sources import sources_of
+from sweeps.engine.sources import say_that_it_waits, sources_of
 from sweeps.engine.together import Together, together
 from sweeps.results import store
 from sweeps.results.agents import check_agents, write_agents
@@ -121,8 +121,8 @@ def _run(group: Together, out: Path, console: Console, seconds: float, how: _How
     console.print(_announcement(group.job, sum(map(len, to_do(group, out))), seconds))
     folders = [out / member.job.sweep.name for member in group.members]
     with contextlib.ExitStack() as locks:
-        for folder in folders:
-            locks.enter_context(files.locked(folder))
+        for member, folder in zip(group.members, folders, strict=True):
+            locks.enter_context(files.locked(folder, say_that_it_waits if member.job.sweep.hands_on else None))
         try:
             if how.client is None:
                 _run_here(group, out, console, seconds, how)

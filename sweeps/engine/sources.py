@@ -31,6 +31,11 @@ def missing_sources(job: Job, seeds: range, out: Path) -> range:
     return range(min(missing), max(missing) + 1) if missing else range(0)
 
 
+def say_that_it_waits(held: str) -> None:
+    """For `files.locked`: of sweeps that share source agents and run at the same time one trains them, others wait."""
+    print(f"{held}; waiting for its agents", file=sys.stderr)
+
+
 def kept_sources(job: Job, seeds: range, out: Path) -> Source:
     """The sources of some seeds from disk, every leaf with leading axes of points and of seeds."""
     parts = [part for part in parts_of(out / job.sweep.name) if set(part.seeds) & set(seeds)]
@@ -56,8 +61,7 @@ def sources_of(
     """
     folder = out / job.sweep.name
     if missing_sources(job, seeds, out):
-        # Sweeps that run at the same time share the folder: one trains, the others wait for its agents.
-        with files.locked(folder, lambda held: print(f"{held}; waiting for its agents", file=sys.stderr)):
+        with files.locked(folder, say_that_it_waits):
             if missing := missing_sources(job, seeds, out):
                 store.add_part(folder, missing, compute(job, missing, None).results)
     store.write_manifest(folder)  # which a killed process may not have come to

@@ -1,5 +1,8 @@
 """Sweeps that are run together: what is run once for several of them, in what order, and that each gets its own."""
 
+import shutil
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import jax
@@ -9,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.console import Console
 
+from jrcjax import files
 from jrcjax.config.paths import parameter_at
 from jrcjax.config.stacking import Values, changes, stacked
 from jrcjax.training import parallel
@@ -16,6 +20,7 @@ from sweeps.design import along, table
 from sweeps.engine.job import Job
 from sweeps.engine.plan import plan, to_do
 from sweeps.engine.run import run_sweep, run_together
+from sweeps.engine.sources import sources_of
 from sweeps.engine.together import together
 from sweeps.preset import base_of
 from sweeps.results import store
@@ -105,6 +110,29 @@ def test_only_what_lacks_the_same_seeds_is_run_together(tmp_path):
 def test_source_agents_are_trained_before_those_who_take_them_over(tmp_path):
     assert groups_of([SWEEPS["fig9"]], TINY, tmp_path) == [["source"], ["fig9"]]
     assert groups_of([SWEEPS["fig9"], SWEEPS["fig5a"]], TINY, tmp_path) == [["source", "fig5a"], ["fig9"]]
+
+
+def test_two_commands_at_once_share_source_agents(tmp_path, capfd):
+    """The second waits for those that the first trains, and trains none."""
+    first, trained = FEW[5], threading.Event()
+
+    def train_slowly():
+        with files.locked(tmp_path / SOURCE.name):
+            trained.wait()
+
+    with ThreadPoolExecutor(2) as pool:
+        other = pool.submit(train_slowly)
+        run = pool.submit(lambda: list(run_together([first], TINY, tmp_path, QUIET)))
+        while "waiting for its agents" not in capfd.readouterr().err:
+            assert not run.done()
+        sources_of(Job(SOURCE, TINY), range(2), tmp_path / "elsewhere")
+        (part,) = parts_of(tmp_path / "elsewhere" / SOURCE.name)
+        shutil.copy(part.path, tmp_path / SOURCE.name)
+        before = (tmp_path / SOURCE.name / part.path.name).stat().st_mtime_ns
+        trained.set()
+        other.result()
+        assert run.result() == [first]
+    assert (tmp_path / SOURCE.name / part.path.name).stat().st_mtime_ns == before
 
 
 @pytest.mark.parametrize(
