@@ -36,7 +36,7 @@ ROOT = Path(__file__).parents[1]
 TABLES = ("claims.json", "regret.csv", "seeds_needed.csv")
 STUDIES = ("robustness", "multiverse", "reconstruction")
 """Whose summaries are published as they are."""
-_OUT = re.compile(r" --out [^ \"]+")  # of a command in a manifest: where results lay on the machine that made them
+_OUT = re.compile(r" --out [^ \"]+")  # of a command in a manifest
 _TEXTS = ("*.md", "paper_figs/*.md", "docs/**/*.md")
 
 
@@ -86,8 +86,7 @@ def publish_figures(out: Path, target: Path, preset: str = Size.preset) -> list[
     copies += [out / f"{name}{suffix}" for name in names for suffix in (".pdf", ".png", ".csv")]
     written = [Path(shutil.copyfile(path, target / path.name)) for path in copies]
     for name in (*(figure.name for figure in FIGURES), "source"):
-        manifest = (folder / name / store.MANIFEST).read_text(encoding="utf-8")
-        written.append(write_text(target / f"{name}.manifest.json", _OUT.sub("", manifest)))
+        written.append(_publish_manifest(folder / name / store.MANIFEST, target / f"{name}.manifest.json"))
     n_seeds = json.loads((out / "claims.json").read_text(encoding="utf-8"))[0]["n_seeds"]
     results = {figure.name: figure.results(folder, n_seeds) for figure in FIGURES}
     numbers = target / "numbers.json"
@@ -95,12 +94,17 @@ def publish_figures(out: Path, target: Path, preset: str = Size.preset) -> list[
     return [*written, numbers]
 
 
+def _publish_manifest(path: Path, target: Path) -> Path:
+    """Copies what says where results come from, but for where they lay on the machine that made them."""
+    return write_text(target, _OUT.sub("", path.read_text(encoding="utf-8")))
+
+
 def publish_study(summary: Path, target: Path) -> Path:
     """Copies a study's summary."""
     shutil.copytree(summary, target, dirs_exist_ok=True)
     manifests = target / "manifests.json"
     if manifests.is_file():
-        write_text(manifests, _OUT.sub("", manifests.read_text(encoding="utf-8")))
+        _publish_manifest(manifests, manifests)
     return target
 
 
@@ -114,7 +118,8 @@ def publish_sweep(folder: Path, target: Path) -> list[Path]:
     """Copies tables, figures and manifest of a custom sweep; returns the files in `target`."""
     target.mkdir(parents=True, exist_ok=True)
     summary = [path for path in sorted(folder.glob(f"{folder.name}*")) if path.suffix in (".csv", ".pdf", ".png")]
-    return [Path(shutil.copyfile(path, target / path.name)) for path in (*summary, folder / store.MANIFEST)]
+    written = [Path(shutil.copyfile(path, target / path.name)) for path in summary]
+    return [*written, _publish_manifest(folder / store.MANIFEST, target / store.MANIFEST)]
 
 
 def renew_texts(root: Path) -> list[Path]:

@@ -72,3 +72,10 @@ def test_figures_that_were_not_made_have_no_verdicts_in_the_file():
     found = pipeline.judgements_of({"fig9": data["fig9"]})
     assert {j.figure for j in found} == {"9"}
     assert len(as_json(found)) < len(claims_of({"fig9": data["fig9"]}))
+
+
+def test_no_published_manifest_says_where_results_lay():
+    manifests = sorted(PUBLISHED.rglob("*manifest*.json"))
+    assert len(manifests) > 10
+    for path in manifests:
+        assert " --out " not in path.read_text(encoding="utf-8"), path
