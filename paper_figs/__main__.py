@@ -10,6 +10,7 @@ from pathlib import Path
 import tyro
 
 from jrcjax.model.presets import ENVIRONMENTS
+from paper_figs import check_numbers
 from paper_figs.claims.delta import Delta
 from sweeps import interrupts
 from sweeps.command import begin
@@ -46,9 +47,12 @@ def main(args: list[str] | None = None) -> int:
     try:
         console = begin()
         size = size_of(options.seeds, options.episodes, preset_of(options.preset), options.smoke)
+        check_numbers(options.only)
+        size.check()
+        options.delta.check()
         with interrupts.terminable():
-            # What imports take is enough to draw the placements of both environments.
-            with ThreadPoolExecutor(len(ENVIRONMENTS), "placements") as drawing:
+            # What imports take is nearly enough to draw the placements of both environments.
+            with ThreadPoolExecutor(1, "placements") as drawing:
                 bases = [drawing.submit(base_of, name, size.preset) for name in ENVIRONMENTS]
                 from paper_figs.pipeline import make_figures
             for base in bases:

@@ -88,5 +88,3 @@ FIGURES = (
         learners=("tlwd",),
     ),
 )
-NUMBERS = tuple(sorted({figure.number for figure in FIGURES}))
-"""Numbers that `--only` takes."""

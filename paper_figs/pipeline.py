@@ -14,13 +14,13 @@ from matplotlib.figure import Figure
 from rich.console import Console
 
 from jrcjax.files import write_text
-from paper_figs import report
+from paper_figs import check_numbers, report
 from paper_figs.analysis import divergence, front, ranking, regret
 from paper_figs.claims.delta import Delta
 from paper_figs.claims.judge import Judgement, as_json
 from paper_figs.claims.results import Rules
 from paper_figs.claims.table import claims_of
-from paper_figs.figures import FIGURES, NUMBERS, PaperFigure
+from paper_figs.figures import FIGURES, PaperFigure
 from paper_figs.plots import front as front_plot
 from paper_figs.plots import style
 from sweeps.engine.estimate import in_words
@@ -43,9 +43,7 @@ def chosen(numbers: tuple[int, ...]) -> list[PaperFigure]:
     Raises:
       ValueError: unknown numbers.
     """
-    unknown = sorted(set(numbers) - set(NUMBERS))
-    if unknown:
-        raise ValueError(f"only: {unknown}; allowed: {', '.join(map(str, NUMBERS))}")
+    check_numbers(numbers)
     return [figure for figure in FIGURES if not numbers or figure.number in numbers]
 
 

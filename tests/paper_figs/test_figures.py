@@ -13,7 +13,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.text import Text
 from worlds import Learner
 
-from paper_figs import report
+from paper_figs import NUMBERS, report
 from paper_figs.__main__ import main
 from paper_figs.analysis import divergence, statistics
 from paper_figs.analysis.intervals import mean_effect
@@ -120,6 +120,10 @@ def test_one_command_writes_everything(tmp_path, capsys):
     assert "all 3 seeds are there" in capsys.readouterr().err
 
 
+def test_numbers_are_those_of_the_figures():
+    assert {figure.number for figure in FIGURES} == set(NUMBERS)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -130,8 +134,9 @@ def test_one_command_writes_everything(tmp_path, capsys):
         (["--preset", "x"], "preset: 'x'; allowed: paper, paper_table, best, or a file"),
     ],
 )
-def test_command_line_errors_write_nothing(arguments, message, capsys, tmp_path):
+def test_command_line_errors_write_and_compute_nothing(arguments, message, capsys, tmp_path, monkeypatch):
     out = tmp_path / "figures"
+    monkeypatch.setattr("paper_figs.__main__.base_of", lambda *_: pytest.fail("placements were drawn"))
     assert main([*arguments, "--out", str(out)]) == 2
     assert message in capsys.readouterr().err
     assert not out.exists()
