@@ -52,7 +52,7 @@ def _seconds_of_figures(quick: bool) -> float:
 def lanes_of(points: int, seeds: int, cores: int) -> tuple[int, int]:
     """Lanes of a learner that so many cores advance, and those asked for."""
     from jrcjax.training import parallel
-    from sweeps.engine.together import parts_for
+    from sweeps.engine.bundle import parts_for
 
     devices = max(cores, 2)
     used = (parallel.padded(points * part, parallel.BLOCK, devices) for part in parts_for(points, seeds, devices))
@@ -66,9 +66,9 @@ def _print_lanes() -> None:
 
     with tempfile.TemporaryDirectory() as empty:
         figures = [sweep for name, sweep in SWEEPS.items() if name.startswith("fig")]
-        groups = plan(figures, Size(seeds=_SEEDS), Path(empty))
+        bundles = plan(figures, Size(seeds=_SEEDS), Path(empty))
     print(f"lanes per learner for {_SEEDS} seeds, used / asked for")
-    for group in groups:
-        of_cores = {cores: "{} / {}".format(*lanes_of(len(group.job.sweep.design), _SEEDS, cores)) for cores in _CORES}
+    for bundle in bundles:
+        of_cores = {cores: "{} / {}".format(*lanes_of(len(bundle.job.sweep.design), _SEEDS, cores)) for cores in _CORES}
         told = ", ".join(f"{lanes} on {cores} cores" for cores, lanes in of_cores.items())
-        print(f"  {group.job.sweep.name}: {told}")
+        print(f"  {bundle.job.sweep.name}: {told}")

@@ -2,7 +2,7 @@
 
 From import to the first trained episode it takes less than 5 s, and less than 2 s from then on. All but set-up is
 measured in processes of their own, first with an empty folder of compiled programs, then with what is there after it.
-Of each figure's sweep only the compiling of its program is timed.
+Of the two programs that serve all figures compiling alone is timed.
 """
 
 from __future__ import annotations

@@ -8,8 +8,8 @@ from typing import Any
 
 from sweeps.engine import estimate
 from sweeps.engine.ahead import Ahead
+from sweeps.engine.bundle import Bundle, bundled, what_is_shared
 from sweeps.engine.job import Job
-from sweeps.engine.together import Together, together, what_is_shared
 from sweeps.results import store
 from sweeps.sweep import Size, Sweep
 
@@ -28,29 +28,18 @@ def blocks(wanted: int, finished: set[int], per_part: int) -> Iterator[range]:
         seed = stop
 
 
-def to_do(group: Together, out: Path) -> list[range]:
-    """The blocks of seeds that any sweep of a group still lacks.
+def to_do(bundle: Bundle, out: Path) -> list[range]:
+    """The blocks of seeds that any sweep of a bundle still lacks.
 
     Raises:
       ConfigurationMismatch: if there are results of another configuration.
     """
-    wanted = group.job.size.seeds
-    missing = set().union(*(lacking(member.job, out) for member in group.members))
-    return list(blocks(wanted, set(range(wanted)) - missing, group.job.sweep.seeds_per_part))
+    wanted = bundle.job.size.seeds
+    missing = set().union(*(store.lacking(member.job, range(wanted), out) for member in bundle.members))
+    return list(blocks(wanted, set(range(wanted)) - missing, bundle.job.sweep.seeds_per_part))
 
 
-def lacking(job: Job, out: Path) -> set[int]:
-    """The seeds of a job that are still to be run.
-
-    Raises:
-      ConfigurationMismatch: if there are results of another configuration.
-    """
-    folder = out / job.sweep.name
-    store.check_folder(folder, job)
-    return set(range(job.size.seeds)) - store.finished_seeds(folder)
-
-
-def plan(sweeps: Sequence[Sweep], size: Size, out: Path) -> list[Together]:
+def plan(sweeps: Sequence[Sweep], size: Size, out: Path) -> list[Bundle]:
     """What is run of these sweeps and of the source agents that they lack, in order.
 
     Sweeps that one program serves, and that lack the same seeds, are run together; those that lack none are left out.
@@ -58,21 +47,21 @@ def plan(sweeps: Sequence[Sweep], size: Size, out: Path) -> list[Together]:
     alike: dict[Any, dict[Sweep, Job]] = {}
 
     def add(job: Job) -> None:
-        if seeds := lacking(job, out):
+        if seeds := store.lacking(job, range(size.seeds), out):
             alike.setdefault((what_is_shared(job.sweep), frozenset(seeds)), {})[job.sweep] = job
 
     for job in [Job(sweep, size) for sweep in sweeps]:
-        if job.source and lacking(job, out):
+        if job.source and store.lacking(job, range(size.seeds), out):
             add(job.source)
         add(job)
-    return [together(tuple(jobs.values())) for jobs in alike.values()]
+    return [bundled(tuple(jobs.values())) for jobs in alike.values()]
 
 
-def expected_seconds(groups: Iterable[Together], out: Path) -> float:
-    """What these groups will take, as far as one can tell beforehand."""
-    return sum(estimate.block_seconds(g.job, len(seeds)) for g in groups for seeds in to_do(g, out))
+def expected_seconds(bundles: Iterable[Bundle], out: Path) -> float:
+    """What these bundles will take, as far as one can tell beforehand."""
+    return sum(estimate.block_seconds(bundle.job, len(seeds)) for bundle in bundles for seeds in to_do(bundle, out))
 
 
-def compile_ahead(groups: Iterable[Together], out: Path) -> Ahead:
-    """Begins to compile, in threads, what these groups need, in their order; for `run_together`."""
-    return Ahead((group.job, todo[0]) for group in groups if (todo := to_do(group, out)))
+def compile_ahead(bundles: Iterable[Bundle], out: Path) -> Ahead:
+    """Begins to compile, in threads, what these bundles need, in their order; for `run_together`."""
+    return Ahead((bundle.job, todo[0]) for bundle in bundles if (todo := to_do(bundle, out)))

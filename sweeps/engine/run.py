@@ -16,11 +16,11 @@ from sweeps import progress
 from sweeps.engine import estimate, pace
 from sweeps.engine.ahead import Ahead
 from sweeps.engine.block import Block, block_of
+from sweeps.engine.bundle import Bundle, bundled
 from sweeps.engine.job import Job
-from sweeps.engine.plan import compile_ahead, expected_seconds, lacking, plan, to_do
+from sweeps.engine.plan import compile_ahead, expected_seconds, plan, to_do
 from sweeps.engine.program import Chunk, advance
 from sweeps.engine.sources import say_that_it_waits, sources_of
-from sweeps.engine.together import Together, together
 from sweeps.results import store
 from sweeps.results.agents import check_agents, write_agents
 from sweeps.sweep import Size, Sweep
@@ -61,7 +61,7 @@ def run_sweep(
     size.check()
     job, folder = Job(sweep, size), out / sweep.name
     job.check()
-    finished = size.seeds - len(lacking(job, out))
+    finished = size.seeds - len(store.lacking(job, range(size.seeds), out))
     if finished and not resume:
         raise ValueError(f"{folder} holds results of {finished} seeds already; add --resume, or choose another --out")
     if save_agents:
@@ -70,12 +70,12 @@ def run_sweep(
         _say_all_there(job, folder, console)
         return folder
     seconds = expected_seconds(plan([sweep], size, out), out)
-    _run(together([job]), out, console, seconds, _How(save_agents, client, patience))
+    _run(bundled([job]), out, console, seconds, _How(save_agents, client, patience))
     return folder
 
 
 def run_together(sweeps: Sequence[Sweep], size: Size, out: Path, console: Console) -> Iterator[Sweep]:
-    """Runs what is missing of some sweeps, in groups that one program serves, while it compiles what comes next.
+    """Runs what is missing of some sweeps, in bundles that one program serves, while it compiles what comes next.
 
     Args:
       sweeps: what to run.
@@ -90,17 +90,17 @@ def run_together(sweeps: Sequence[Sweep], size: Size, out: Path, console: Consol
       ValueError: more than this machine can hold, or results of another configuration in `out`.
       FolderInUse: if another process writes to one of the folders.
     """
-    groups = plan(sweeps, size, out)
-    waiting = {member.job.sweep for group in groups for member in group.members}
-    with contextlib.closing(compile_ahead(groups, out)) as ahead:
+    bundles = plan(sweeps, size, out)
+    waiting = {member.job.sweep for bundle in bundles for member in bundle.members}
+    with contextlib.closing(compile_ahead(bundles, out)) as ahead:
         for sweep in sweeps:
             if sweep not in waiting:
                 _say_all_there(Job(sweep, size), out / sweep.name, console)
                 yield sweep
-        for group in groups:
-            group.job.check()
-            _run(group, out, console, expected_seconds([group], out), _How(ahead=ahead))
-            yield from (member.job.sweep for member in group.members if member.job.sweep in sweeps)
+        for bundle in bundles:
+            bundle.job.check()
+            _run(bundle, out, console, expected_seconds([bundle], out), _How(ahead=ahead))
+            yield from (member.job.sweep for member in bundle.members if member.job.sweep in sweeps)
 
 
 def _say_all_there(job: Job, folder: Path, console: Console) -> None:
@@ -109,7 +109,7 @@ def _say_all_there(job: Job, folder: Path, console: Console) -> None:
 
 
 class _How(NamedTuple):
-    """How a group is run; see `run_sweep`."""
+    """How a bundle is run; see `run_sweep`."""
 
     save_agents: bool = False
     client: Any = None
@@ -117,17 +117,17 @@ class _How(NamedTuple):
     ahead: Ahead | None = None
 
 
-def _run(group: Together, out: Path, console: Console, seconds: float, how: _How) -> None:
-    console.print(_announcement(group.job, sum(map(len, to_do(group, out))), seconds))
-    folders = [out / member.job.sweep.name for member in group.members]
+def _run(bundle: Bundle, out: Path, console: Console, seconds: float, how: _How) -> None:
+    console.print(_announcement(bundle.job, sum(map(len, to_do(bundle, out))), seconds))
+    folders = [out / member.job.sweep.name for member in bundle.members]
     with contextlib.ExitStack() as locks:
-        for member, folder in zip(group.members, folders, strict=True):
+        for member, folder in zip(bundle.members, folders, strict=True):
             locks.enter_context(files.locked(folder, say_that_it_waits if member.job.sweep.hands_on else None))
         try:
             if how.client is None:
-                _run_here(group, out, console, seconds, how)
+                _run_here(bundle, out, console, seconds, how)
             else:
-                _run_on_cluster(group, out, console, how)
+                _run_on_cluster(bundle, out, console, how)
         except (KeyboardInterrupt, OSError):
             for folder in folders:
                 saved = store.in_words(store.finished_seeds(folder))
@@ -136,13 +136,13 @@ def _run(group: Together, out: Path, console: Console, seconds: float, how: _How
             raise
 
 
-def save(block: Block, group: Together, out: Path, save_agents: bool) -> None:
+def save(block: Block, bundle: Bundle, out: Path, save_agents: bool) -> None:
     """Keeps a block: of each sweep its agents if they are wanted, then its part."""
-    for member in group.members:
+    for member in bundle.members:
         folder = out / member.job.sweep.name
         if save_agents:
-            write_agents(folder, member.job, block.seeds, group.agents_of(member, block.agents))
-        store.add_part(folder, block.seeds, group.results_of(member, block.results))
+            write_agents(folder, member.job, block.seeds, bundle.agents_of(member, block.agents))
+        store.add_part(folder, block.seeds, bundle.results_of(member, block.results))
 
 
 class _Shown:
@@ -174,25 +174,25 @@ class _Shown:
             self.stopwatch.start()
 
 
-def _run_here(group: Together, out: Path, console: Console, seconds: float, how: _How) -> None:
+def _run_here(bundle: Bundle, out: Path, console: Console, seconds: float, how: _How) -> None:
     """Runs what is missing, as it is now that nobody else writes, and shows the progress of so many seconds."""
-    job = group.job
+    job = bundle.job
     with progress.shown(console, job.sweep.name, seconds) as told:
         shown = _Shown(told, how.ahead)
-        for seeds in to_do(group, out):
+        for seeds in to_do(bundle, out):
             source = sources_of(job.source, seeds, out, shown.compute) if job.source else None
-            save(shown.compute(job, seeds, source), group, out, how.save_agents)
+            save(shown.compute(job, seeds, source), bundle, out, how.save_agents)
         shown.stopwatch.keep()
 
 
-def _run_on_cluster(group: Together, out: Path, console: Console, how: _How) -> None:
+def _run_on_cluster(bundle: Bundle, out: Path, console: Console, how: _How) -> None:
     """The same on a cluster; the progress counts seeds, over all workers."""
     from sweeps.engine import distributed  # which needs an extra
 
-    job, todo = group.job, to_do(group, out)
+    job, todo = bundle.job, to_do(bundle, out)
     with progress.shown(console, f"{job.sweep.name} on a cluster", sum(map(len, todo))) as told:
         for block in distributed.compute_blocks(how.client, job, out, todo, how.patience):
-            save(block, group, out, how.save_agents)
+            save(block, bundle, out, how.save_agents)
             told(len(block.seeds))
 
 

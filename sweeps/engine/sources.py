@@ -25,9 +25,7 @@ def missing_sources(job: Job, seeds: range, out: Path) -> range:
     Raises:
       ConfigurationMismatch: if the folder of the sweep holds agents of another configuration.
     """
-    folder = out / job.sweep.name
-    store.check_folder(folder, job)
-    missing = set(seeds) - store.finished_seeds(folder)
+    missing = store.lacking(job, seeds, out)
     return range(min(missing), max(missing) + 1) if missing else range(0)
 
 

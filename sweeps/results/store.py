@@ -7,6 +7,7 @@ folder, for a reader; it follows from the parts and is written anew whenever it 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,8 @@ from sweeps.results.parts import Part, finished_seeds, part_path, parts_of, read
 
 __all__ = [
     "MANIFEST", "ConfigurationMismatch", "about", "add_part", "check_configuration", "check_folder", "configuration",
-    "dataset", "finished_seeds", "load", "part_path", "points_of", "sweep_of", "write_manifest", "write_part",
+    "dataset", "finished_seeds", "lacking", "load", "part_path", "points_of", "sweep_of", "write_manifest",
+    "write_part",
 ]  # fmt: skip
 
 MANIFEST = "manifest.json"
@@ -46,6 +48,17 @@ def check_folder(folder: Path, job: Job) -> None:
             files.set_aside(part.path, f"it is of the sweep {part.configuration.get('sweep')!r}")
         else:
             check_configuration(part, wanted)
+
+
+def lacking(job: Job, seeds: Iterable[int], out: Path) -> set[int]:
+    """Those of the seeds that the folder of the job's sweep in `out` has no results of.
+
+    Raises:
+      ConfigurationMismatch: if it holds results of another configuration.
+    """
+    folder = out / job.sweep.name
+    check_folder(folder, job)
+    return set(seeds) - finished_seeds(folder)
 
 
 def check_configuration(part: Part, wanted: dict[str, Any]) -> None:

@@ -328,10 +328,10 @@ def test_a_transfer_sweep_compiles_once_for_all_blocks_and_that_ahead_of_them(tm
     size = replace(TINY, seeds=2 * FIG5A.seeds_per_part, episodes=1, pretraining=3)
     sweep = replace(PAIR, learners=("tlwd", "dpr"))
     again = replace(sweep, name="again", design=along(_P, _P, (0.2, 0.4, 0.6)))  # a program serves any few points
-    groups = plan([FIG5A, sweep], size, tmp_path)
-    with compilations() as compiled, contextlib.closing(compile_ahead(groups, tmp_path)) as ahead:
-        for group in groups:
-            ahead.wait(group.job.sweep)
+    bundles = plan([FIG5A, sweep], size, tmp_path)
+    with compilations() as compiled, contextlib.closing(compile_ahead(bundles, tmp_path)) as ahead:
+        for bundle in bundles:
+            ahead.wait(bundle.job.sweep)
         # Source agents start and advance like those of Fig. 5(a), and demonstrate; the sweep's start and advance.
         assert compiled.count("jit(checked)") == 5
         assert list(run_together([FIG5A, sweep], size, tmp_path, QUIET)) == [FIG5A, sweep]

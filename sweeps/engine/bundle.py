@@ -30,7 +30,7 @@ class Member(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Together:
+class Bundle:
     """Sweeps that are run as one."""
 
     job: Job
@@ -58,15 +58,13 @@ def _unwanted(job: Job, results: xr.Dataset) -> list[str]:
 
 def what_is_shared(sweep: Sweep) -> Sweep:
     """Sweeps for which this is the same can be run together: they differ in points, and in what is kept of them."""
-    usual = Sweep(name="", description="", learners=sweep.learners)
-    free = {name: getattr(usual, name) for name in ("name", "description", "design", "hands_on", "seeds_per_part")}
-    return dataclasses.replace(sweep, **free)
+    return dataclasses.replace(sweep, name="", description="", design=Design(), hands_on=False, seeds_per_part=1)
 
 
-def together(jobs: Sequence[Job]) -> Together:
+def bundled(jobs: Sequence[Job]) -> Bundle:
     """Jobs of one size whose sweeps have in common `what_is_shared`, as one."""
     if len(jobs) == 1:
-        return Together(jobs[0], (Member(jobs[0], tuple(range(len(jobs[0].sweep.design)))),))
+        return Bundle(jobs[0], (Member(jobs[0], tuple(range(len(jobs[0].sweep.design)))),))
     rows = [_rows(job) for job in jobs]
     different = list(dict.fromkeys(row for of_job in rows for row in of_job))
     sweeps = [job.sweep for job in jobs]
@@ -78,14 +76,14 @@ def together(jobs: Sequence[Job]) -> Together:
         seeds_per_part=parts_for(len(different), jobs[0].size.seeds)[0],
     )
     members = [Member(job, tuple(map(different.index, of_job))) for job, of_job in zip(jobs, rows, strict=True)]
-    return Together(Job(sweep, jobs[0].size), tuple(members))
+    return Bundle(Job(sweep, jobs[0].size), tuple(members))
 
 
 def parts_for(points: int, seeds: int, available: int | None = None) -> list[int]:
     """Seeds of each part: as few as take no more rounds of blocks than many, so that an interrupt costs little.
 
     Args:
-      points: of a group.
+      points: of a bundle.
       seeds: that it lacks.
       available: devices, those of this process if None.
     """

@@ -17,11 +17,11 @@ from jrcjax.config.paths import parameter_at
 from jrcjax.config.stacking import Values, changes, stacked
 from jrcjax.training import parallel
 from sweeps.design import along, table
+from sweeps.engine.bundle import bundled
 from sweeps.engine.job import Job
 from sweeps.engine.plan import plan, to_do
 from sweeps.engine.run import run_sweep, run_together
 from sweeps.engine.sources import sources_of
-from sweeps.engine.together import together
 from sweeps.preset import base_of
 from sweeps.results import store
 from sweeps.results.parts import parts_of
@@ -48,8 +48,8 @@ def digests(out, names):
     return {(name, part.seeds): part.digest for name in names for part in parts_of(out / name)}
 
 
-def groups_of(sweeps, size, out):
-    return [[member.job.sweep.name for member in group.members] for group in plan(sweeps, size, out)]
+def names_of(sweeps, size, out):
+    return [[member.job.sweep.name for member in bundle.members] for bundle in plan(sweeps, size, out)]
 
 
 def test_together_or_alone_a_figure_has_the_same_bits(tmp_path):
@@ -66,7 +66,7 @@ def test_together_or_alone_a_figure_has_the_same_bits(tmp_path):
 
 
 def test_the_paper_s_figures_are_two_programs_and_share_the_target(tmp_path):
-    assert groups_of(FIGURES, Size(), tmp_path) == [["fig5a", "source"], ["fig5b", "fig6", "fig7", "fig8", "fig9"]]
+    assert names_of(FIGURES, Size(), tmp_path) == [["fig5a", "source"], ["fig5b", "fig6", "fig7", "fig8", "fig9"]]
     source, target = plan(FIGURES, Size(), tmp_path)
     assert len(source.job.sweep.design) == 1
     # 1 + 9 + 9 + 9 + 2 points, of which the target is in all but Fig. 8, whose densities leave it out.
@@ -78,9 +78,9 @@ def test_the_paper_s_figures_are_two_programs_and_share_the_target(tmp_path):
 
 
 def test_shared_points_have_the_numbers_that_each_sweep_asks_for(tmp_path):
-    for group in plan(FIGURES, Size(), tmp_path):
-        for member in group.members:
-            some = jax.tree.map(lambda leaf, rows=list(member.points): np.asarray(leaf)[rows], group.job.points)
+    for bundle in plan(FIGURES, Size(), tmp_path):
+        for member in bundle.members:
+            some = jax.tree.map(lambda leaf, rows=list(member.points): np.asarray(leaf)[rows], bundle.job.points)
             jax.tree.map(np.testing.assert_array_equal, some, jax.tree.map(np.asarray, member.job.points))
 
 
@@ -94,10 +94,10 @@ def test_parts_are_small_but_cost_no_round_more_than_large_ones(tmp_path, monkey
 
 def test_only_what_lacks_the_same_seeds_is_run_together(tmp_path):
     run_sweep(FEW[1], replace(TINY, seeds=1), tmp_path, QUIET, resume=False)  # and a source agent
-    groups = plan(FEW, TINY, tmp_path)
-    names = [[member.job.sweep.name for member in group.members] for group in groups]
+    bundles = plan(FEW, TINY, tmp_path)
+    names = [[member.job.sweep.name for member in bundle.members] for bundle in bundles]
     assert names == [["fig5a"], ["source"], ["fig5b"], ["fig6", "fig7", "fig8", "fig9"]]
-    assert [to_do(group, tmp_path) for group in groups] == [[range(2)], [range(1, 2)], [range(1, 2)], [range(2)]]
+    assert [to_do(bundle, tmp_path) for bundle in bundles] == [[range(2)], [range(1, 2)], [range(1, 2)], [range(2)]]
     before = digests(tmp_path, ["source", "fig5b"])
     some = [FEW[1], FEW[3]]
     assert list(run_together(some, TINY, tmp_path, QUIET)) == some
@@ -108,8 +108,8 @@ def test_only_what_lacks_the_same_seeds_is_run_together(tmp_path):
 
 
 def test_source_agents_are_trained_before_those_who_take_them_over(tmp_path):
-    assert groups_of([SWEEPS["fig9"]], TINY, tmp_path) == [["source"], ["fig9"]]
-    assert groups_of([SWEEPS["fig9"], SWEEPS["fig5a"]], TINY, tmp_path) == [["source", "fig5a"], ["fig9"]]
+    assert names_of([SWEEPS["fig9"]], TINY, tmp_path) == [["source"], ["fig9"]]
+    assert names_of([SWEEPS["fig9"], SWEEPS["fig5a"]], TINY, tmp_path) == [["source", "fig5a"], ["fig9"]]
 
 
 def test_two_commands_at_once_share_source_agents(tmp_path, capfd):
@@ -147,27 +147,27 @@ def test_two_commands_at_once_share_source_agents(tmp_path, capfd):
     ],
 )
 def test_sweeps_of_other_programs_or_sources_are_run_apart(other, tmp_path):
-    groups = groups_of([SWEEPS["fig5b"], replace(other, name="other")], TINY, tmp_path)
-    assert ["fig5b"] in groups
-    assert ["other"] in groups
+    bundles = names_of([SWEEPS["fig5b"], replace(other, name="other")], TINY, tmp_path)
+    assert ["fig5b"] in bundles
+    assert ["other"] in bundles
 
 
-def test_agents_of_a_group_are_those_of_each_sweep(tmp_path):
-    group = together([Job(sweep, TINY) for sweep in FEW[1:4]])
+def test_agents_of_a_bundle_are_those_of_each_sweep(tmp_path):
+    bundle = bundled([Job(sweep, TINY) for sweep in FEW[1:4]])
     keys = jax.random.split(jax.random.key(0), (3, 2))
     agents = {"tlwd": (np.arange(6.0).reshape(3, 2), keys)}
-    assert len(group.job.sweep.design) == 3
-    for member, rows in zip(group.members, ([0], [0, 1], [2, 0]), strict=True):
-        values, found = group.agents_of(member, agents)["tlwd"]
+    assert len(bundle.job.sweep.design) == 3
+    for member, rows in zip(bundle.members, ([0], [0, 1], [2, 0]), strict=True):
+        values, found = bundle.agents_of(member, agents)["tlwd"]
         np.testing.assert_array_equal(values, agents["tlwd"][0][rows])
         np.testing.assert_array_equal(jax.random.key_data(found), jax.random.key_data(keys)[np.array(rows)])
 
 
-def test_settings_that_decide_code_stay_apart_within_a_group():
+def test_settings_that_decide_code_stay_apart_within_a_bundle():
     optimisers = replace(SWEEPS["fig5b"], name="optimisers", design=along("o", "config.optimiser", (0.0, 1.0)))
-    group = together([Job(SWEEPS["fig5b"], TINY), Job(optimisers, TINY)])
-    assert [g.config.optimiser for g in group.job.groups] == ["adam", "adam", "sgd"][1:]
-    assert group.members[1].points[1] != group.members[1].points[0]
+    bundle = bundled([Job(SWEEPS["fig5b"], TINY), Job(optimisers, TINY)])
+    assert [g.config.optimiser for g in bundle.job.groups] == ["adam", "sgd"]
+    assert bundle.members[1].points[1] != bundle.members[1].points[0]
 
 
 _TARGET = base_of("target", "paper").points
@@ -191,5 +191,5 @@ def test_a_value_changes_the_base_if_and_only_if_the_point_differs_from_it(path,
 
 def test_an_empty_row_is_the_base_whatever_the_columns(tmp_path):
     sweep = replace(SWEEPS["fig5b"], name="rows", design=table([{}, {"p": 0.4}, {"p": 0.5}], {"p": _P.path}))
-    group = together([Job(SWEEPS["fig5b"], TINY), Job(sweep, TINY)])
-    assert [member.points for member in group.members] == [(0,), (0, 0, 1)]
+    bundle = bundled([Job(SWEEPS["fig5b"], TINY), Job(sweep, TINY)])
+    assert [member.points for member in bundle.members] == [(0,), (0, 0, 1)]
