@@ -11,7 +11,7 @@ PEERS_STAMP := $(VENV)/.peers
 DOCS_STAMP := $(VENV)/.docs
 
 .DEFAULT_GOAL := help
-.PHONY: setup figures test bench peers sweeps docs explore lint types lock-check lock clean help
+.PHONY: setup figures test bench peers sweeps docs explore lint types lock-check lock banks clean help
 
 setup: $(STAMP)  ## make .venv with the locked packages and this project
 
@@ -97,6 +97,9 @@ lock:  ## renew requirements.lock (needs uv; UPGRADE=--upgrade for newer version
 	uv pip compile --universal --python-version 3.11 --fork-strategy fewest --prerelease if-necessary-or-explicit \
 	  --generate-hashes --no-header --no-annotate --no-emit-index-url --no-emit-find-links --quiet $(UPGRADE) \
 	  --extra studies --extra dev pyproject.toml -o requirements.lock
+
+banks: $(STAMP)  ## renew the stored placements of the paper's environments, after what draws them has changed
+	$(PY) .ci/renew_banks.py
 
 clean:  ## remove the environment and everything else that was built
 	rm -rf $(VENV) build dist site .pytest_cache .ruff_cache .hypothesis

@@ -23,6 +23,7 @@ from jrcjax.kept import kept
 from jrcjax.keys import key_of
 from jrcjax.radar.modes import Modes, fresh_miss_ratio, fresh_miss_ratio_of, fresh_placement, room_for
 from jrcjax.radar.placement import Footprints
+from jrcjax.radar.stored import stored
 from jrcjax.types import Key, Words
 
 PLACEMENTS = ("bank", "fresh")
@@ -82,15 +83,19 @@ def bank_key(seed: Int[Array, ""], mode: int | Int[Array, ""], i: Int[Array, ""]
 
 
 def bank_of(modes: Modes, seed: Int[Array, ""], size: int) -> Float[Array, "K B"]:
-    """Miss ratios of `size` independent placements per mode; where all numbers are known, made once and kept."""
-    leaves = jax.tree.leaves((modes, seed))
+    """Miss ratios of `size` independent placements per mode; if all numbers are known, stored, kept or drawn once."""
     if size * sum(modes.max_objects) > _MOST_PLACED:
         allowed = f"at most {_MOST_PLACED // sum(modes.max_objects)} placements of {modes.max_objects} objects"
         refuse("radar.bank_size", size, allowed)
-    if is_traced(*leaves):
+    if is_traced(*jax.tree.leaves((modes, seed))):
         return _build(modes, seed, size)
-    content = tuple((np.asarray(leaf).tobytes(), leaf.shape) for leaf in leaves)
-    return _known_bank(_Described((content, modes.max_objects, size), modes, seed, size))
+    return _known_bank(_Described(content_of(modes, seed, size), modes, seed, size))
+
+
+def content_of(modes: Modes, seed: Int[Array, ""], size: int) -> tuple[Any, ...]:
+    """All that a bank is made from, as bytes, shapes and integers; the numbers must be known."""
+    leaves = jax.tree.leaves((modes, seed))
+    return tuple((np.asarray(leaf).tobytes(), leaf.shape) for leaf in leaves), modes.max_objects, size
 
 
 @dataclasses.dataclass(frozen=True)
@@ -106,13 +111,18 @@ class _Described:
 @functools.lru_cache(_KNOWN_BANKS)
 def _known_bank(described: _Described) -> Array:
     with jax.ensure_compile_time_eval():  # kept banks are numbers, also if a trace asks first
-        return jnp.asarray(kept("banks", described.content, lambda: _draw(described)))
+        with_the_package = stored(described.content)
+        if with_the_package is not None:
+            return jnp.asarray(with_the_package)
+        modes, seed, size = described.modes, described.seed, described.size
+        return jnp.asarray(kept("banks", described.content, lambda: draw(modes, seed, size)))
 
 
-def _draw(described: _Described) -> Array:
-    leaves, structure = jax.tree.flatten((described.modes, described.seed))
+def draw(modes: Modes, seed: Int[Array, ""], size: int) -> Float[Array, "K B"]:
+    """`bank_of` known numbers, drawn now, wherever it may already lie; also while something is traced."""
+    leaves, structure = jax.tree.flatten((modes, seed))
     shapes = tuple(jax.ShapeDtypeStruct(leaf.shape, leaf.dtype) for leaf in leaves)
-    return _compiled(structure, shapes, described.size)(described.modes, described.seed)
+    return _compiled(structure, shapes, size)(modes, seed)
 
 
 @functools.cache
