@@ -28,7 +28,6 @@ from sweeps.sweep import Size, Study, Sweep
 
 SIZE = Size(seeds=2, episodes=450)
 """The claims speak of episodes up to 400, and of what follows."""
-SMOKE = Size(seeds=2, episodes=20, pretraining=50, demonstrations=400)
 _NUMBER, _SMOKE_NUMBER, _MOST = 512, 2, 2**20
 _LANES = 128  # seeds times points in a part, as far as points allow
 
@@ -185,7 +184,6 @@ MULTIVERSE = Study(
     description=f"all claims in {_NUMBER} readings of the paper, over {len(READINGS)} questions that it leaves open",
     sweeps=(),
     size=SIZE,
-    smoke_size=SMOKE,
     presets=("paper",),  # where they differ is a reading itself
     summary="paper_figs.studies.summaries:summarise_multiverse",
 )

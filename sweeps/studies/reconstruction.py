@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from jrcjax.checks import require_integer
-from sweeps.studies.multiverse import SIZE, SMOKE, block_sweep, digest_of, points_of
+from sweeps.studies.multiverse import SIZE, block_sweep, digest_of, points_of
 from sweeps.studies.readings import values_at
 from sweeps.sweep import Size, Study, Sweep
 
@@ -75,7 +75,6 @@ RECONSTRUCTION = Study(
     description="the reading in which most of the paper's text holds: search, and confirmation with fresh seeds",
     sweeps=(),
     size=SIZE,
-    smoke_size=SMOKE,
     presets=("paper",),
     search="paper_figs.studies.reconstruction:search",
 )

@@ -282,7 +282,7 @@ def test_agreement_weighs_claims_and_not_statements():
     ],
 )
 def test_bad_efforts_are_refused(flags, message, tmp_path, capsys):
-    assert main(["run", *flags, "--smoke", "--out", str(tmp_path)]) == 2
+    assert main(["run", *flags, "--smoke", "--episodes", "1", "--out", str(tmp_path)]) == 2
     assert message in capsys.readouterr().err
     assert not any(tmp_path.iterdir())
 

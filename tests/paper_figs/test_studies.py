@@ -40,7 +40,7 @@ def test_seeds_needed_give_the_right_sign_with_95_percent():
 
 @pytest.mark.slow
 def test_a_tiny_robustness_study_writes_its_summary_and_goes_on(tmp_path, capsys):
-    run = ["run", "robustness", "--smoke", "--episodes", "30", "--out", str(tmp_path)]
+    run = ["run", "robustness", "--smoke", "--out", str(tmp_path)]
     assert main([*run, "--seeds", "2"]) == 0
     assert main([*run, "--seeds", "4", "--resume"]) == 0
     summary = tmp_path / "robustness" / "summary"

@@ -13,6 +13,7 @@ from jrcjax.config.paths import Points, parameter_at
 from jrcjax.config.stacking import with_value
 from jrcjax.model.params import Factor
 from jrcjax.readings import EventModel
+from jrcjax.training.transfer import TARGET_LEARNERS
 from paper_figs.plots import curves
 from sweeps.__main__ import main
 from sweeps.engine.job import Job
@@ -309,8 +310,8 @@ def test_the_base_may_be_a_file(tmp_path):
 
 
 def test_one_command_runs_and_draws_it(capsys, tmp_path):
-    command = ["run", "custom", "--vary", "env.event_model=noisy_or,conditional", "--learners", "q_learning", "dpr"]
-    size = ["--smoke", "--episodes", "1", "--out", str(tmp_path), "--name", "own"]
+    command = ["run", "custom", "--vary", "env.event_model=noisy_or,conditional", "--learners", *TARGET_LEARNERS]
+    size = ["--smoke", "--out", str(tmp_path), "--name", "own"]
     assert main([*command, *size]) == 0
     folder = tmp_path / "own"
     assert str(folder / "own.pdf") in capsys.readouterr().out

@@ -93,5 +93,5 @@ def test_a_run_keeps_its_pace_and_the_next_one_tells_it(kept, tmp_path):
     pace.of_machine.cache_clear()
     measured = pace.of_machine()
     assert kept.is_file()
-    run_sweep(SWEEP, Size(seeds=1, episodes=2), tmp_path / "two", console, resume=False)
+    run_sweep(SWEEP, Size(seeds=1, episodes=20), tmp_path / "two", console, resume=False)
     assert f"compiling, if no earlier run did: {estimate.in_words(measured.compiling)}" in console.export_text()

@@ -1,6 +1,7 @@
 """Questions that the paper leaves open act on those who read them, and on nobody else."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,9 +18,9 @@ from sweeps.results import store
 from sweeps.results.agents import agents_path
 from sweeps.studies.multiverse import block_sweep
 from sweeps.studies.readings import READINGS, SOURCE, is_static, range_of
-from sweeps.sweep import Size
+from sweeps.sweep import SMOKE
 
-SIZE = Size(seeds=1, episodes=3, pretraining=50, demonstrations=300)
+SIZE = replace(SMOKE, seeds=1)
 SOON = {"hparams.epsilon_slots": 300.0}
 """What learners know shows after an episode."""
 METRICS = ("reward", "throughput", "miss_detection", "policy_reward")
