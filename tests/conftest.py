@@ -3,6 +3,8 @@
 Two CPU devices, so that what is sharded over devices is sharded in the tests, too.
 """
 
+import gc
+
 import jax
 import numpy_model
 import pytest
@@ -15,6 +17,7 @@ from jrcjax.training import parallel
 
 jax.config.update("jax_num_cpu_devices", 2)  # nothing above makes an array
 parallel.set_flags()  # those of commands, so that both find each other's programs
+gc.set_threshold(100_000, 20, 100)  # tracing makes many small objects that stay, and a session's are millions
 parallel.keep_compiled()  # most of the time goes into compiling, often of what another process compiled before
 
 PAPER = [(environment, preset) for preset in ("paper", "paper_table") for environment in ("source", "target")]
