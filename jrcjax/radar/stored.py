@@ -23,7 +23,8 @@ _VERSIONS = {name: provenance.version_of(name) for name in ("jax", "distrax")}
 
 def code() -> str:
     """What turns a radar's parameters into a bank: source and versions."""
-    return repr((hashlib.sha256(b"".join(path.read_bytes() for path in _SOURCE)).hexdigest(), _VERSIONS))
+    source = b"".join(path.read_bytes() for path in _SOURCE if path.is_file())  # a frozen program has none
+    return repr((hashlib.sha256(source).hexdigest(), _VERSIONS))
 
 
 _CODE = code()  # as it is imported, and not as it may be when a bank is asked for

@@ -67,7 +67,11 @@ def test_whoever_changes_what_draws_gets_other_banks(monkeypatch):
         patch.setattr(stored, "_VERSIONS", stored._VERSIONS | {"jax": "99"})
         patch.setattr(stored, "_CODE", stored.code())
         changed.add(stored.name_of(content))
-    assert len(changed) == 5
+    with monkeypatch.context() as patch:
+        patch.setattr(stored, "_SOURCE", [path.with_suffix(".none") for path in stored._SOURCE])
+        patch.setattr(stored, "_CODE", stored.code())
+        changed.add(stored.name_of(content))
+    assert len(changed) == 6
     assert "detection.py" in {path.name for path in stored._SOURCE}
 
 
