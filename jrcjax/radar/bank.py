@@ -111,11 +111,11 @@ class _Described:
 @functools.lru_cache(_KNOWN_BANKS)
 def _known_bank(described: _Described) -> Array:
     with jax.ensure_compile_time_eval():  # kept banks are numbers, also if a trace asks first
-        with_the_package = stored(described.content)
-        if with_the_package is not None:
-            return jnp.asarray(with_the_package)
-        modes, seed, size = described.modes, described.seed, described.size
-        return jnp.asarray(kept("banks", described.content, lambda: draw(modes, seed, size)))
+        found = stored(described.content)
+        if found is None:
+            made_from = described.modes, described.seed, described.size
+            found = kept("banks", described.content, lambda: draw(*made_from))
+        return jnp.asarray(found)
 
 
 def draw(modes: Modes, seed: Int[Array, ""], size: int) -> Float[Array, "K B"]:
