@@ -11,7 +11,7 @@ import contextlib
 import functools
 import hashlib
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import jax
@@ -56,15 +56,17 @@ def kept(name: str, content: object, make: Callable[[], jax.Array]) -> np.ndarra
     return made
 
 
-def _source_of(package: Path) -> str:
-    """A digest of a package's modules."""
+def source_of(modules: Iterable[Path]) -> str:
+    """A digest of modules, sorted by path; those that are not there, as in a frozen program, are left out."""
     source = hashlib.sha256()
-    for path in sorted(package.rglob("*.py")):
-        source.update(path.read_bytes())
+    for path in sorted(modules):
+        source.update(path.read_bytes() if path.is_file() else b"")
     return source.hexdigest()
 
 
-_SOURCE = _source_of(Path(__file__).parent)  # as it is imported, and not as it may be when something is made
+_SOURCE = source_of(
+    Path(__file__).parent.rglob("*.py")
+)  # as it is imported, and not as it may be when something is made
 
 
 @functools.cache

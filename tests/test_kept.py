@@ -58,10 +58,10 @@ def test_other_code_and_other_settings_make_them_anew(folder, change, monkeypatc
 
 def test_the_source_of_the_package_is_part_of_what_decides(tmp_path):
     (tmp_path / "draw.py").write_text("one = 1\n")
-    one = module._source_of(tmp_path)
-    assert one == module._source_of(tmp_path)
+    one = module.source_of(tmp_path.rglob("*.py"))
+    assert one == module.source_of(tmp_path.rglob("*.py"))
     (tmp_path / "draw.py").write_text("one = 2\n")
-    assert one != module._source_of(tmp_path)
+    assert one != module.source_of(tmp_path.rglob("*.py"))
     assert module._SOURCE in module._code()
 
 

@@ -15,16 +15,16 @@ from pathlib import Path
 import numpy as np
 
 from jrcjax import numerics, provenance
+from jrcjax.kept import source_of
 
 FILE = Path(__file__).with_name("stored_banks.npz")
-_SOURCE = (*sorted(FILE.parent.glob("*.py")), *(FILE.parents[1] / f"{m}.py" for m in ("keys", "numerics", "readings")))
+_SOURCE = (*FILE.parent.glob("*.py"), *(FILE.parents[1] / f"{m}.py" for m in ("keys", "numerics", "readings")))
 _VERSIONS = {name: provenance.version_of(name) for name in ("jax", "distrax")}
 
 
 def code() -> str:
     """What turns a radar's parameters into a bank: source and versions."""
-    source = b"".join(path.read_bytes() for path in _SOURCE if path.is_file())  # a frozen program has none
-    return repr((hashlib.sha256(source).hexdigest(), _VERSIONS))
+    return repr((source_of(_SOURCE), _VERSIONS))
 
 
 _CODE = code()  # as it is imported, and not as it may be when a bank is asked for
