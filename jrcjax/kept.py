@@ -64,9 +64,8 @@ def source_of(modules: Iterable[Path]) -> str:
     return source.hexdigest()
 
 
-_SOURCE = source_of(
-    Path(__file__).parent.rglob("*.py")
-)  # as it is imported, and not as it may be when something is made
+# As it is imported, and not as it may be when something is made.
+_SOURCE = source_of(Path(__file__).parent.rglob("*.py"))
 
 
 @functools.cache
