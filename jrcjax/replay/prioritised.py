@@ -15,7 +15,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jrcjax.replay import packing, sum_tree
+from jrcjax.replay import lookup, packing, sum_tree
 from jrcjax.replay.n_step import NStepTransition
 from jrcjax.replay.packing import NUMBER, SWITCH, Power
 from jrcjax.types import Bool, Float, Int, Words
@@ -38,6 +38,11 @@ class Layout(NamedTuple):
     def per_line(self) -> int:
         """Transitions of a line, and words of their priorities, which come first."""
         return self.tree.children
+
+    @property
+    def line_words(self) -> int:
+        """Length of a line."""
+        return self.per_line * (1 + self.rows.words)
 
     def word(self, index: Int) -> Int:
         """Where in its line transition number `index` begins."""
@@ -130,19 +135,13 @@ def sample(replay: Replay, words: Words, layout: Layout, discount: Float) -> Sam
     # The values come with the indices: reading them from the tree again would not be ordered before its update, and XLA
     # would copy the whole tree in every step.
     line, _, rest = sum_tree.sample(replay.tree, words, layout.tree)
-    place, value, _ = sum_tree.child_at(_as_numbers(_slices(replay.lines, line, 0, layout.per_line)), rest)
-    indices = line * layout.per_line + place
-    rows = _slices(replay.lines, line, layout.word(place), layout.rows.words)
+    begin = line * layout.line_words
+    column, value, _ = sum_tree.child_at(_as_numbers(lookup.read(replay.lines, begin, layout.per_line)), rest)
+    indices = line * layout.per_line + column
+    rows = lookup.read(replay.lines, begin + layout.word(column), layout.rows.words)
     probability = value / sum_tree.total(replay.tree, layout.tree)
     transitions = packing.unpack(rows, layout.rows, discount)
     return Sample(transitions, indices, probability, indices < layout.demonstrations)
-
-
-def _slices(lines: Words, line: Int, begin: Int | int, number: int) -> Words:
-    """So many words of each of some lines [B], from `begin` on, [B, number]."""
-    starts = jnp.stack(jnp.broadcast_arrays(line, jnp.asarray(begin, line.dtype)), axis=-1)
-    numbers = jax.lax.GatherDimensionNumbers(offset_dims=(1,), collapsed_slice_dims=(0,), start_index_map=(0, 1))
-    return jax.lax.gather(lines, starts, numbers, (1, number), mode=jax.lax.GatherScatterMode.PROMISE_IN_BOUNDS)
 
 
 def _as_words(priorities: Float) -> Words:
@@ -163,10 +162,9 @@ def set_priorities(replay: Replay, indices: Int, priorities: Float, exponent: Fl
     scaled = jnp.exp(exponent * jnp.log(priorities))  # the power function of XLA on a CPU is not vectorised
     largest = jnp.maximum(replay.largest, scaled.max())
     line = layout.tree.parent(indices)
-    # By one number each, since XLA writes line and place of every one to memory before it goes there.
-    flat = replay.lines.reshape(-1).at[line * replay.lines.shape[1] + layout.tree.column(indices)]
-    lines = flat.set(_as_words(scaled), mode="promise_in_bounds").reshape(replay.lines.shape)
-    sums = sum_tree.sum_of(_as_numbers(_slices(lines, line, 0, layout.per_line)))
+    begin = line * layout.line_words
+    lines = lookup.write(replay.lines, begin + layout.tree.column(indices), _as_words(scaled))
+    sums = sum_tree.sum_of(_as_numbers(lookup.read(lines, begin, layout.per_line)))
     return Replay(lines, sum_tree.update(replay.tree, line, sums, layout.tree), largest)
 
 

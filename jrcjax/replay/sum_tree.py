@@ -26,6 +26,7 @@ import jax
 import jax.numpy as jnp
 
 from jrcjax import rng
+from jrcjax.replay import lookup
 from jrcjax.types import Float, Int, Words
 
 _TOP_ROWS = 16  # rows of the top level, at most
@@ -117,19 +118,12 @@ def update(tree: Float, indices: Int, values: Float, layout: Layout) -> Float:
     If an index appears more than once the last of its values counts, on an accelerator any of them; every sum agrees
     with its leaves in either case.
     """
-    *lower, top = layout.first_row
-    for first_row in lower:
-        tree = _with(tree, first_row, indices, values)
+    *lower, top = (first_row * layout.children for first_row in layout.first_row)
+    for begin in lower:
+        tree = lookup.write(tree, begin + indices, values)
         indices = layout.parent(indices)
-        values = sum_of(tree.at[first_row + indices].get(mode="promise_in_bounds"))
-    return _with(tree, top, indices, values)
-
-
-def _with(tree: Float, first_row: int, indices: Int, values: Float) -> Float:
-    """The tree with these values at these places [B] of the level that begins at `first_row`."""
-    # By one number each, since XLA writes row and column of every place to memory before it goes there.
-    flat = tree.reshape(-1).at[first_row * tree.shape[1] + indices].set(values, mode="promise_in_bounds")
-    return flat.reshape(tree.shape)
+        values = sum_of(lookup.read(tree, begin + indices * layout.children, layout.children))
+    return lookup.write(tree, top + indices, values)
 
 
 def update_one(tree: Float, index: Int, value: Float, layout: Layout) -> Float:
@@ -167,7 +161,7 @@ def sample(tree: Float, words: Words, layout: Layout) -> tuple[Int, Float, Float
     rest = rng.uniform(words[1]) * value
     levels = [(level, 0) for level in upper[::-1]] + [(tree, first_row) for first_row in layout.first_row[-2::-1]]
     for rows, first_row in levels:
-        child, value, rest = child_at(rows.at[first_row + node].get(mode="promise_in_bounds"), rest)
+        child, value, rest = child_at(lookup.read(rows, (first_row + node) * layout.children, layout.children), rest)
         node = node * layout.children + child
     return node, value, rest
 

@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 
 from jrcjax import rng
-from jrcjax.replay import packing
+from jrcjax.replay import lookup, packing
 from jrcjax.types import Float, Int, Words
 
 
@@ -49,5 +49,5 @@ def draw(words: Words, count: Int, capacity: int) -> Int:
 
 
 def at(ring: Words, positions: Int, layout: packing.Layout, discount: Float) -> Transition:
-    """The transitions at these positions, of any shape; `discount` is gamma, of which a ring keeps whether it is 0."""
-    return packing.unpack(ring.at[positions].get(mode="promise_in_bounds"), layout, discount)
+    """The transitions at these positions [B]; `discount` is gamma, of which a ring keeps whether it is 0."""
+    return packing.unpack(lookup.read(ring, positions * layout.words, layout.words), layout, discount)
