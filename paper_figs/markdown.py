@@ -37,3 +37,8 @@ def wrapped(item: str) -> str:
             line = " "
         line += f" {word}"
     return "\n".join([*lines, line])
+
+
+def from_to(numbers: set[int]) -> str:
+    """The ends of some numbers, or the only one."""
+    return " to ".join(str(n) for n in sorted({min(numbers), max(numbers)})) if numbers else "no"

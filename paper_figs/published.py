@@ -10,7 +10,7 @@ import pandas as pd
 
 from paper_figs.claims.judge import VERDICTS
 from paper_figs.claims.table import number_of
-from paper_figs.markdown import percent
+from paper_figs.markdown import from_to, percent
 from paper_figs.studies import multiverse
 from paper_figs.studies.reconstruction import DEFAULT, LEAST_LOSS
 from sweeps.studies.multiverse import MULTIVERSE
@@ -34,11 +34,6 @@ def share(row: Mapping[Hashable, Any], name: str) -> str:
 def seeds_of(verdicts: pd.DataFrame) -> str:
     """How many seeds rows have: "5", "1 to 5"."""
     return from_to({int(n) for n in verdicts.n_seeds.dropna()})
-
-
-def from_to(numbers: set[int]) -> str:
-    """The ends of some numbers, or the only one."""
-    return " to ".join(str(n) for n in sorted({min(numbers), max(numbers)})) if numbers else "no"
 
 
 def share_of(holds: pd.Series) -> str:

@@ -11,9 +11,9 @@ import numpy as np
 import pandas as pd
 
 from jrcjax.readings import Loss
-from paper_figs.markdown import listed, paragraph, percent, table
+from paper_figs.markdown import from_to, listed, paragraph, percent, table
 from paper_figs.mechanisms_text import step_sizes_in_short
-from paper_figs.published import csv_of, from_to, held, holds_in, of_multiverse, seeds_of, share, share_of, tried_in
+from paper_figs.published import csv_of, held, holds_in, of_multiverse, seeds_of, share, share_of, tried_in
 from paper_figs.studies import multiverse
 from sweeps.design import in_range
 from sweeps.preset import SOURCES

@@ -9,8 +9,8 @@ import numpy as np
 
 from paper_figs.claims.judge import VERDICTS
 from paper_figs.claims.results import Rules
-from paper_figs.markdown import listed, percent, table
-from paper_figs.published import counted, csv_of, from_to, seeds_of, share
+from paper_figs.markdown import from_to, listed, percent, table
+from paper_figs.published import counted, csv_of, seeds_of, share
 from paper_figs.studies import multiverse
 from sweeps.studies.multiverse import MULTIVERSE
 
@@ -34,10 +34,10 @@ def judged_table(published: Path) -> str:
     claims = csv_of(published, MULTIVERSE.name, "claims")
     names = (*VERDICTS, "unknown_then", "negligible")
     rows = [
-        (row["claim"], *("–" if np.isnan(row[name]) else share(row, name) for name in names))
+        (row["claim"], str(int(row["judged"])), *("–" if np.isnan(row[name]) else share(row, name) for name in names))
         for row in claims.query("judged > 0").to_dict("records")
     ]
-    return table(("statement", *VERDICTS, "of these unknown", "negligible, of those that compare"), rows)
+    return table(("statement", "readings", *VERDICTS, "of these unknown", "negligible, of those that compare"), rows)
 
 
 def looks_table(published: Path) -> str:
@@ -64,13 +64,15 @@ def judged_list(published: Path) -> str:
         return listed([f"No reading has seeds enough for a verdict, which takes {Rules().least_seeds}."])
     mostly = {v: claims.claim[claims[f"{v}_low"] > 0.5] for v in ("supported", "contradicted")}
     never = claims.claim[claims.supported == 0]
+    readings, of_each = judged.reading.nunique(), set(judged.claim.value_counts())
+    in_some = f" (each statement {from_to(of_each)} of them)" if len(of_each) > 1 else ""
     in_words = [
         f"In more than half, interval included, {v}: {'; '.join(names) or 'none'}." for v, names in mostly.items()
     ]
     return listed(
         [
-            f"{judged.reading.nunique()} of {verdicts.reading.nunique()} readings have {seeds_of(judged)} seeds, and "
-            f"{len(judged)} verdicts: " + counted(judged) + ".",
+            f"{readings} of {verdicts.reading.nunique()} readings have {seeds_of(judged)} seeds{in_some}, and "
+            f"{len(judged)} verdicts: {counted(judged)}.",
             *in_words,
             f"Supported in none of them: {'; '.join(never) or 'none'}.",
         ]

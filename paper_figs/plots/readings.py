@@ -7,6 +7,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from paper_figs.markdown import from_to
 from paper_figs.plots import style
 
 _DEFAULT = "default"
@@ -41,8 +42,8 @@ def draw_shares(claims: pd.DataFrame) -> Figure:
     axes.set_xlim(-2, 102)
     axes.grid(axis="y", linewidth=0.2)
     axes.set_xlabel("share of readings (%)")
-    judged = int(claims.judged.max())
-    of_verdicts = f", verdicts of {judged} of them" if judged else ""
+    judged = {int(number) for number in claims.judged if number}
+    of_verdicts = f", verdicts of {from_to(judged)} of them" if judged else ""
     figure.suptitle(f"Where the claims hold: {int(claims.readings.max())} readings{of_verdicts} (bars: 95 % intervals)")
     figure.legend(loc="outside lower center", ncols=4)
     return figure

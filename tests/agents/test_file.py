@@ -27,7 +27,7 @@ from sweeps.results import store
 from sweeps.results.agents import agents_path
 from sweeps.sweep import Size, Sweep
 
-CONFIG = jrcjax.Config(episodes=3, demonstrations=50, pretraining=10, replay_capacity=200, hidden=(8,))
+CONFIG = jrcjax.Config(episodes=3, demonstrations=50, pretraining=10, replay_capacity=200, hidden=(9,))
 KEY = jax.random.key(3)
 LEARNERS = ("ddqn", "q_learning")
 HPARAMS = jrcjax.HParams(discount=jnp.float32(0.9), target_period=jnp.int32(11))
@@ -196,7 +196,7 @@ def test_what_it_hands_on_is_what_the_source_agent_in_memory_hands_on(saved, par
     for name in ("state", "action", "next_state", "n_state"):
         assert_same(getattr(from_disk.demonstrations, name), getattr(source.demonstrations, name))
     np.testing.assert_allclose(from_disk.demonstrations.n_return, source.demonstrations.n_return, rtol=1e-5)
-    more = saved["ddqn"].source(jrcjax.Config(demonstrations=70, hidden=(8,)))
+    more = saved["ddqn"].source(jrcjax.Config(demonstrations=70, hidden=(9,)))
     assert more.demonstrations.state.shape == (70,)
 
 
@@ -226,7 +226,7 @@ def test_agents_without_a_network_hand_nothing_on(saved):
     [
         ({"learner": "round_robin"}, "learner: 'round_robin' is unknown; allowed: 'q_learning', 'ddqn', 'dpr', 'tlwd'"),
         ({"learner": "q_learning"}, r"agents.q_learning: .*allowed: \{'q': \(1, 1, 32, 4\)\}"),
-        ({"config": jrcjax.Config()}, r"agents.ddqn: .*\(1, 1, 8, 5\).*allowed: .*\(1, 1, 24, 5\)"),
+        ({"config": jrcjax.Config()}, r"agents.ddqn: .*\(1, 1, 9, 5\).*allowed: .*\(1, 1, 24, 5\)"),
         ({"agent": 3}, "agent: int; allowed: AgentState"),
     ],
 )
@@ -238,7 +238,7 @@ def test_agents_that_are_not_what_is_said_are_not_saved(change, message, trained
 
 
 def test_an_optimiser_without_a_name_leaves_the_agent_usable(trained, params, tmp_path):
-    config = jrcjax.Config(episodes=3, hidden=(8,), optimiser=optax.lion(1e-3))
+    config = jrcjax.Config(episodes=3, hidden=(9,), optimiser=optax.lion(1e-3))
     path = jrcjax.save_agent(tmp_path / "agent", trained["ddqn"][0], params, learner="ddqn", config=config)
     agent = jrcjax.load_agent(path)
     assert agent.config.optimiser == "optax"
@@ -336,8 +336,8 @@ def test_an_agent_that_diverged_is_refused(number, file, tmp_path):
 
 
 def test_a_file_of_another_shape_is_refused(file, tmp_path):
-    wider = layout.read(file).about["config"] | {"hidden": [9]}
-    with pytest.raises(ValueError, match=r"agents.ddqn: .*\(8, 5\).*allowed: .*\(9, 5\)"):
+    wider = layout.read(file).about["config"] | {"hidden": [10]}
+    with pytest.raises(ValueError, match=r"agents.ddqn: .*\(9, 5\).*allowed: .*\(10, 5\)"):
         jrcjax.load_agent(rewritten(file, tmp_path / "wider", {"config": wider}))
 
 

@@ -394,7 +394,7 @@ def test_updates_against_algorithm_2(case):
 
 
 SMALL = Config(
-    episodes=3, batch_size=8, replay_capacity=150, demonstrations=100, pretraining=20, n_step=4, hidden=(8,)
+    episodes=3, batch_size=8, replay_capacity=150, demonstrations=100, pretraining=20, n_step=4, hidden=(9,)
 )  # fmt: skip
 
 

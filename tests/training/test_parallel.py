@@ -19,7 +19,7 @@ from jrcjax.training.rollout import init_agent, learner_for, run_episodes
 
 ROOT = Path(__file__).parents[2]
 UNIT = parallel.BLOCK * jax.device_count()
-CONFIG = Config(episodes=3, batch_size=8, replay_capacity=64, hidden=(8,), optimiser="sgd")
+CONFIG = Config(episodes=3, batch_size=8, replay_capacity=64, hidden=(9,), optimiser="sgd")
 
 
 def environment():

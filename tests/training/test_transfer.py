@@ -22,7 +22,7 @@ from jrcjax.training.source import demonstrate
 from jrcjax.training.transfer import TARGET_LEARNERS, Transfer, target_key
 
 CONFIG = Config(
-    episodes=2, batch_size=8, replay_capacity=600, demonstrations=107, pretraining=20, n_step=4, hidden=(8,)
+    episodes=2, batch_size=8, replay_capacity=600, demonstrations=107, pretraining=20, n_step=4, hidden=(9,)
 )  # fmt: skip
 HPARAMS = HParams(epsilon_slots=jnp.float32(30.0), target_period=jnp.int32(7))
 KEYS = jax.random.split(jax.random.key(5), 2)
@@ -289,7 +289,7 @@ def test_sources_that_do_not_fit_are_refused_by_name(case, learner, params):
 
 @pytest.mark.usefixtures("nothing_runs")
 def test_weights_of_other_layers_are_refused_by_name(params):
-    for hidden in [(9,), (8, 8), ()]:
+    for hidden in [(8,), (9, 9), ()]:
         source = good_source(params[1], hidden=hidden)
         with pytest.raises(ValueError, match=r"^source\.weights: .*allowed: .*config\.hidden"):
             jrcjax.train(KEYS[0], params[1], learner="tlwd", config=CONFIG, source=source)
