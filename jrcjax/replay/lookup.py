@@ -1,7 +1,7 @@
 """Reads and writes of a table at many places at once, for all samples of a mini-batch.
 
-A place is one number, the word's when rows are counted through one after the other: of rows and columns XLA on a CPU
-would make a table of pairs before it goes there.
+A place is the number of a word, counted through all rows one after the other: pairs of row and column XLA on a CPU
+would write to memory first, which takes longer.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from jrcjax.types import Int
 
 def read(table: jax.Array, places: Int, number: int) -> jax.Array:
     """So many words of a table [N, M] from each of these places [B] on, which have to be there; [B, number]."""
-    numbers = jax.lax.GatherDimensionNumbers(offset_dims=(1,), collapsed_slice_dims=(), start_index_map=(0,))
-    return jax.lax.gather(table.reshape(-1), places[:, None], numbers, (number,), mode="promise_in_bounds")
+    dimensions = jax.lax.GatherDimensionNumbers(offset_dims=(1,), collapsed_slice_dims=(), start_index_map=(0,))
+    return jax.lax.gather(table.reshape(-1), places[:, None], dimensions, (number,), mode="promise_in_bounds")
 
 
 def write(table: jax.Array, places: Int, words: jax.Array) -> jax.Array:
@@ -32,7 +32,7 @@ _write = jax.custom_batching.custom_vmap(_write_in)
 
 @_write.def_vmap
 def _write_of_all(agents: int, is_batched: list[bool], *args: jax.Array) -> tuple[jax.Array, bool]:
-    """The same for many agents: in one table, again by one number each, where there are numbers enough."""
+    """The same for many agents: in one table, whose places are single numbers again, unless they are too large."""
     flat, places, words = (
         x if own else jnp.broadcast_to(x, (agents, *x.shape)) for x, own in zip(args, is_batched, strict=True)
     )

@@ -177,7 +177,8 @@ def test_what_has_a_verdict_and_what_verdicts_say(published):
         "- 3 of 41 readings have 5 seeds, and 6 verdicts: 0 supported, 4 contradicted, 2 undecided."
     )
     file = published / "multiverse" / "verdicts.csv"
-    (table := pd.read_csv(file)).drop(table.index[(table.n_seeds == 5) & (table.claim == "C4")][0]).to_csv(file)
+    rows = pd.read_csv(file)
+    rows.drop(rows.query("n_seeds == 5 and claim == 'C4'").index[0]).to_csv(file)
     assert "- 3 of 41 readings have 5 seeds (each statement 2 to 3 of them), and 5 verdicts: " in " ".join(
         verdicts_text.judged_list(published).split()
     )
