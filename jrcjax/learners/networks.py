@@ -17,6 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 from flax import linen as nn
 
+from jrcjax import rng
 from jrcjax.readings import Initialiser
 from jrcjax.types import Float, Int, Key
 
@@ -79,7 +80,7 @@ def initial_kernel(key: Key, shape: tuple[int, int], choice: Int | int = 0) -> F
     variance = np.array([1 / fan_in, 2 / (fan_in + fan_out), 2 / fan_in], np.float32)
     factors = np.stack([np.sqrt(variance) / np.float32(_STD_OF_TRUNCATED), np.sqrt(3 * variance)])
     of_normal, of_uniform = jnp.asarray(factors)[:, choice]
-    share = jax.random.uniform(key, shape, jnp.float32)
+    share = (rng.bits(key, shape) >> 9).astype(jnp.float32) * jnp.float32(2.0**-23)  # what jax.random.uniform gives
     edge = jax.lax.erf(jnp.float32(_TRUNCATED_AT / math.sqrt(2)))
     normal = jnp.float32(math.sqrt(2)) * jax.lax.erf_inv(jnp.maximum(-edge, share * (2 * edge) - edge))
     inside = jnp.nextafter(jnp.float32(_TRUNCATED_AT), jnp.float32(0.0))

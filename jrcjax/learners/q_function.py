@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-import numpy as np
+from flax import linen as nn
 
 from jrcjax.learners.base import Spec
 from jrcjax.learners.hparams import Config, HParams
@@ -39,11 +39,8 @@ class QFunction(NamedTuple):
 
     def columns(self, weights: Any, ids: Int | None = None) -> Float:
         """Q(s, .; theta) of states [N], [A, N]; of all states if there are no ids."""
-        if ids is not None:
-            features = states.features_of(ids, self.shape)
-        else:
-            with jax.ensure_compile_time_eval():  # a constant, by which XLA sees that all calls compute the same
-                features = np.asarray(states.features_of(jnp.arange(states.num_states(self.shape)), self.shape))
+        # All features are a constant, by which XLA sees that all calls compute the same.
+        features = states.all_features(self.shape) if ids is None else states.features_of(ids, self.shape)
         return self.network.apply(weights, features.T)  # pyright: ignore
 
     def table(self, weights: Any) -> Float:
@@ -109,7 +106,8 @@ class QFunction(NamedTuple):
 def q_function(spec: Spec, config: Config) -> QFunction:
     """The network of `config` for a problem."""
     as_table = config.uses_table(states.num_states(spec.shape))
-    network = QNetwork(spec.num_actions, config.hidden)
+    # Each use of the network traces its initialiser for shapes; `init` brings the one that draws.
+    network = QNetwork(spec.num_actions, config.hidden, nn.initializers.zeros)
     return QFunction(network, spec.shape, as_table, config.target_update == "soft")
 
 

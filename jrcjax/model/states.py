@@ -6,9 +6,11 @@ An id counts in mixed radix with the channel as the most significant digit: with
 
 from __future__ import annotations
 
+import functools
 import math
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float, Int
 
 
@@ -19,11 +21,12 @@ def num_states(shape: tuple[int, ...]) -> int:
 
 def levels_of(state: Int[Array, "*batch"], shape: tuple[int, ...]) -> Int[Array, "*batch F"]:
     """Levels (c, r, w, v, m) of state ids [...]; [..., F]."""
+    rest = jnp.asarray(state).astype(jnp.uint32)  # divides in one loop, where signed numbers take several
     levels = []
     for size in reversed(shape):
-        levels.append(state % size)
-        state = state // size
-    return jnp.stack(levels[::-1], axis=-1)
+        levels.append(rest % size)
+        rest = rest // size
+    return jnp.stack(levels[::-1], axis=-1).astype(jnp.int32)
 
 
 def id_of(levels: Int[Array, "*batch F"], shape: tuple[int, ...]) -> Int[Array, "*batch"]:
@@ -39,3 +42,12 @@ def features_of(state: Int[Array, "*batch"], shape: tuple[int, ...]) -> Float[Ar
     levels = levels_of(state, shape).astype(jnp.float32)
     largest = jnp.maximum(jnp.asarray(shape, jnp.float32) - 1.0, 1.0)
     return levels / jnp.broadcast_to(largest, levels.shape)
+
+
+@functools.lru_cache
+def all_features(shape: tuple[int, ...]) -> np.ndarray:
+    """`features_of` all states in order, [S, F]: a constant of programs, read-only, and made without a program."""
+    levels = np.stack(np.unravel_index(np.arange(num_states(shape)), shape), axis=-1).astype(np.float32)
+    features = levels / np.maximum(np.asarray(shape, np.float32) - 1.0, 1.0)
+    features.flags.writeable = False
+    return features

@@ -203,6 +203,7 @@ def test_state_ids_count_in_mixed_radix(shape, strict):
     scaled = np.array(list(product(*map(range, shape)))) / np.maximum(np.array(shape) - 1.0, 1.0)
     np.testing.assert_allclose(features, scaled, rtol=RTOL)
     assert len(np.unique(features, axis=0)) == len(ids)
+    np.testing.assert_array_equal(states.all_features(shape), features)
 
 
 def test_levels_follow_from_their_random_number(strict):
