@@ -59,7 +59,8 @@ def looks_table(published: Path) -> str:
 def judged_list(published: Path) -> str:
     """What has a verdict, and what verdicts say in most readings."""
     claims, verdicts = (csv_of(published, MULTIVERSE.name, name) for name in ("claims", "verdicts"))
-    judged = multiverse.judged(multiverse.sampled(verdicts))
+    sampled = multiverse.sampled(verdicts)
+    judged = multiverse.judged(sampled)
     if judged.empty:
         return listed([f"No reading has seeds enough for a verdict, which takes {Rules().least_seeds}."])
     mostly = {v: claims.claim[claims[f"{v}_low"] > 0.5] for v in ("supported", "contradicted")}
@@ -71,8 +72,8 @@ def judged_list(published: Path) -> str:
     ]
     return listed(
         [
-            f"{readings} of {verdicts.reading.nunique()} readings have {seeds_of(judged)} seeds{in_some}, and "
-            f"{len(judged)} verdicts: {counted(judged)}.",
+            f"{readings} of the sample's {sampled.reading.nunique()} readings have {seeds_of(judged)} seeds{in_some}, "
+            f"and {len(judged)} verdicts: {counted(judged)}.",
             *in_words,
             f"Supported in none of them: {'; '.join(never) or 'none'}.",
         ]

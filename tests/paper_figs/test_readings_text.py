@@ -174,12 +174,12 @@ def test_shares_and_what_decides_are_those_of_the_tables(published):
 def test_what_has_a_verdict_and_what_verdicts_say(published):
     text = verdicts_text.judged_list(published)
     assert " ".join(text.split()).startswith(
-        "- 3 of 41 readings have 5 seeds, and 6 verdicts: 0 supported, 4 contradicted, 2 undecided."
+        "- 3 of the sample's 40 readings have 5 seeds, and 6 verdicts: 0 supported, 4 contradicted, 2 undecided."
     )
     file = published / "multiverse" / "verdicts.csv"
     rows = pd.read_csv(file)
     rows.drop(rows.query("n_seeds == 5 and claim == 'C4'").index[0]).to_csv(file)
-    assert "- 3 of 41 readings have 5 seeds (each statement 2 to 3 of them), and 5 verdicts: " in " ".join(
+    assert "- 3 of the sample's 40 readings have 5 seeds (each statement 2 to 3 of them), and 5 verdicts: " in " ".join(
         verdicts_text.judged_list(published).split()
     )
     everything = "; ".join(pd.read_csv(published / "multiverse" / "claims.csv").claim)
