@@ -105,7 +105,7 @@ def _compute(params: EnvParams) -> dict[str, Any]:
     return {
         "first": [_first(factor) for factor in params.factors],
         "later": [_later(factor) for factor in params.factors],
-        "features": states.features_of(jnp.arange(params.num_states), params.shape),
+        "features": states.all_features(params.shape),
         "event_probability": events.event_probability(params),
         "reward": jnp.stack(given),
         "packets": packets,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 import math
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -39,15 +40,17 @@ def id_of(levels: Int[Array, "*batch F"], shape: tuple[int, ...]) -> Int[Array, 
 
 def features_of(state: Int[Array, "*batch"], shape: tuple[int, ...]) -> Float[Array, "*batch F"]:
     """What an agent observes in states [...]: each level scaled to [0, 1]; [..., F] float32."""
-    levels = levels_of(state, shape).astype(jnp.float32)
-    largest = jnp.maximum(jnp.asarray(shape, jnp.float32) - 1.0, 1.0)
-    return levels / jnp.broadcast_to(largest, levels.shape)
+    return _scaled(levels_of(state, shape), shape)
+
+
+def _scaled(levels: Any, shape: tuple[int, ...]) -> Any:
+    largest = np.maximum(np.asarray(shape, np.float32) - np.float32(1.0), np.float32(1.0))
+    return levels.astype(np.float32) / np.broadcast_to(largest, levels.shape)
 
 
 @functools.lru_cache
 def all_features(shape: tuple[int, ...]) -> np.ndarray:
     """`features_of` all states in order, [S, F]: a constant of programs, read-only, and made without a program."""
-    levels = np.stack(np.unravel_index(np.arange(num_states(shape)), shape), axis=-1).astype(np.float32)
-    features = levels / np.maximum(np.asarray(shape, np.float32) - 1.0, 1.0)
+    features = _scaled(np.stack(np.unravel_index(np.arange(num_states(shape)), shape), axis=-1), shape)
     features.flags.writeable = False
     return features
