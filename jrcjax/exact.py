@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from jrcjax.checks import is_positive, require
+from jrcjax.compiled import compiled
 from jrcjax.model import metrics, states
 from jrcjax.model.channel import delivered_packets
 from jrcjax.model.events import event_probability
@@ -67,12 +68,14 @@ def _of_all(matrices: Sequence[Array]) -> Float[Array, "S S"]:
 
 
 @of_params
+@compiled
 def state_transition(params: EnvParams) -> Float[Array, "S S"]:
     """P(s' | s), [S, S]."""
     return _of_all([level_transition(factor.prior, factor.persistence) for factor in params.factors])
 
 
 @of_params
+@compiled
 def transition_tensor(params: EnvParams) -> Float[Array, "S A S"]:
     """P(s' | s, a), [S, A, S]; equation (10). Actions have no influence on the state."""
     matrix = state_transition(params)
@@ -80,6 +83,7 @@ def transition_tensor(params: EnvParams) -> Float[Array, "S A S"]:
 
 
 @of_params
+@compiled
 def stationary_distribution(params: EnvParams) -> Float[Array, " S"]:
     """Long-run probability of each state under every policy, [S]: the product of the priors."""
     law = jnp.ones(1, jnp.float32)
@@ -89,6 +93,7 @@ def stationary_distribution(params: EnvParams) -> Float[Array, " S"]:
 
 
 @of_params
+@compiled
 def packet_table(params: EnvParams) -> Float[Array, "S A"]:
     """Packets delivered in each state by each action, [S, A]; 0 for radar."""
     channel = states.levels_of(jnp.arange(params.num_states), params.shape)[:, 0]
@@ -98,6 +103,7 @@ def packet_table(params: EnvParams) -> Float[Array, "S A"]:
 
 
 @of_params
+@compiled
 def miss_table(params: EnvParams) -> Float[Array, " A"]:
     """E[p_k] of each action, [A]; 1 for data."""
     return jnp.concatenate([jnp.ones(params.num_rates, jnp.float32), mean_miss_ratio(params.radar)])
@@ -120,6 +126,7 @@ def _mean_of_powers(params: EnvParams) -> Float[Array, "S S"]:
 
 
 @of_params
+@compiled
 def as_observed(params: EnvParams, table: Float[Array, "S A"]) -> Float[Array, "S A"]:
     """The mean of a table [S, A] of what slots give, over the slots in which the agent observes each state; [S, A].
 
@@ -132,12 +139,14 @@ def as_observed(params: EnvParams, table: Float[Array, "S A"]) -> Float[Array, "
 
 
 @of_params
+@compiled
 def expected_reward(params: EnvParams) -> Float[Array, "S A"]:
     """E[rho | s, a] in the slots in which an agent observes s, [S, A]; see `as_observed`."""
     return as_observed(params, slot_reward(params))
 
 
 @of_params
+@compiled
 def slot_reward(params: EnvParams) -> Float[Array, "S A"]:
     """E[rho | s, a] of a slot whose event and packets belong to s, [S, A].
 
@@ -150,6 +159,7 @@ def slot_reward(params: EnvParams) -> Float[Array, "S A"]:
 
 
 @of_params
+@compiled
 def largest_reward(params: EnvParams) -> Float[Array, ""]:
     """Max |rho_t| over states, actions, events and miss ratios, a scalar; equation (11) is linear in the miss ratio."""
     is_data, packets = _is_data(params)[None], packet_table(params)
@@ -184,8 +194,12 @@ def value_iteration(
     """
     require("gamma", gamma, (), lambda x: (x >= 0) & (x < 1), "a discount in [0, 1)")
     require("tolerance", tolerance, (), is_positive, "a number > 0")
+    return _value_iteration(params, jnp.asarray(gamma, jnp.float32), jnp.asarray(tolerance, jnp.float32))
+
+
+@compiled
+def _value_iteration(params: EnvParams, gamma: Float[Array, ""], tolerance: Float[Array, ""]) -> Float[Array, "S A"]:
     transition, rewards = transition_tensor(params), expected_reward(params)
-    gamma = jnp.asarray(gamma, jnp.float32)
     scale = gamma / (1.0 - gamma)
 
     def backup(values: Float[Array, " S"]) -> Float[Array, "S A"]:
@@ -231,6 +245,7 @@ def policy_of_actions(actions: Int[Array, "*batch S"], num_actions: int) -> Floa
 
 
 @of_params
+@compiled
 def best_constant_action(params: EnvParams) -> Float[Array, "S A"]:
     """The policy [S, A] that takes the same action in every state and earns the most in the long run."""
     earned = stationary_distribution(params) @ expected_reward(params)
@@ -257,6 +272,11 @@ def evaluate_policy(params: EnvParams, policy: Float[Array, "S A"]) -> LongRun:
     """
     shape = (params.num_states, params.num_actions)
     require("policy", policy, shape, _is_policy, "probabilities in [0, 1] whose rows sum to 1")
+    return _long_run(params, policy)
+
+
+@compiled
+def _long_run(params: EnvParams, policy: Float[Array, "S A"]) -> LongRun:
     # How often an action is taken while each state decides what it gives.
     visits = stationary_distribution(params)[:, None] * as_observed(params, policy)
     p = event_probability(params)[:, None]

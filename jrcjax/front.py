@@ -16,6 +16,7 @@ import jax
 import jax.numpy as jnp
 
 from jrcjax.checks import is_not_negative, require
+from jrcjax.compiled import compiled
 from jrcjax.exact import as_observed, miss_table, packet_table, policy_of_actions, stationary_distribution
 from jrcjax.model import metrics
 from jrcjax.model.events import event_probability
@@ -34,6 +35,7 @@ class Boundary(NamedTuple):
 
 
 @of_params
+@compiled
 def contributions(params: EnvParams) -> tuple[Float, Float]:
     """What each action in each state adds to (throughput, miss detection) per slot in the long run, both [S, A].
 
@@ -76,7 +78,6 @@ def _exchanges(gain: Float, cost: Float) -> tuple[Float, Float, Float, Float]:
     return gain[first], cost[first], gains, costs
 
 
-@jax.jit  # else each call would compile the scan anew
 def _lower_boundary(gain: Float, cost: Float) -> Boundary:
     """The lower boundary of the Minkowski sum of the states' polygons, from contributions [S, A]."""
     start_gain, start_cost, gains, costs = jax.vmap(_exchanges)(gain, cost)
@@ -90,6 +91,7 @@ def _lower_boundary(gain: Float, cost: Float) -> Boundary:
 
 
 @of_params
+@compiled
 def reachable(params: EnvParams) -> tuple[Boundary, Boundary]:
     """The exact set of (throughput, miss detection) that policies can reach: what lies between two boundaries.
 
@@ -103,6 +105,7 @@ def reachable(params: EnvParams) -> tuple[Boundary, Boundary]:
 
 
 @of_params
+@compiled
 def front(params: EnvParams) -> Boundary:
     """The part of the reachable set on which nothing is gained in one figure without losing in the other.
 
@@ -116,6 +119,7 @@ def front(params: EnvParams) -> Boundary:
 
 
 @of_params
+@compiled
 def lowest_miss_detection(params: EnvParams, throughput: Float | float) -> Float:
     """The smallest miss detection of any policy with this throughput or more, in packets per slot; any shape.
 

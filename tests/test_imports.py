@@ -13,6 +13,7 @@ FLOORS = (
     (
         "types",
         "checks",
+        "compiled",
         "keys",
         "readings",
         "containers",

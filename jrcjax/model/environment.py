@@ -10,6 +10,7 @@ from flax import struct
 from jaxtyping import Array, Bool, Float, Int
 
 from jrcjax.checks import require, require_keys, require_type
+from jrcjax.compiled import compiled
 from jrcjax.model import slot, states
 from jrcjax.model.params import EnvParams, check_params
 from jrcjax.model.presets import paper_params
@@ -88,10 +89,7 @@ class JRCEnv:
         """Observation and state at the start of an episode."""
         require_type("params", params, EnvParams)
         require_keys(key, 0, _ONE_KEY)
-        words = jax.random.bits(key, (slot.NUM_WORDS,), jnp.uint32)
-        first = slot.initial_state(words, params)
-        state = EnvState(first, jnp.int32(0), first)
-        return self.get_obs(state, params), state
+        return _reset(key, params)
 
     def reset(self, key: Key, params: EnvParams | None = None) -> tuple[Float[Array, " F"], EnvState]:
         """Observation and state at the start of an episode."""
@@ -102,16 +100,11 @@ class JRCEnv:
     ) -> tuple[Float[Array, " F"], EnvState, Float[Array, ""], Bool[Array, ""], dict[str, Any]]:
         """One slot without reset: (obs, state, reward, terminated, info)."""
         _check_step(key, state, action, params)
-        words = jax.random.bits(key, (slot.NUM_WORDS,), jnp.uint32)
-        outcome = slot.run_slot(words, state.id, jnp.asarray(action, jnp.int32), params, state.first)
-        new = EnvState(outcome.next_state, state.time + 1, state.first)
-        info = {"event": outcome.event, "packets": outcome.packets, "miss_ratio": outcome.miss_ratio}
-        terminated = (new.time >= params.max_steps_in_episode) & (params.terminal_time_limit == 1)
-        return self.get_obs(new, params), new, outcome.reward, terminated, info
+        return _step(key, state, jnp.asarray(action, jnp.int32), params)
 
     def is_truncated(self, state: EnvState, params: EnvParams) -> Bool[Array, ""]:
         """Whether the time limit cuts the episode here, without being part of the problem."""
-        return (state.time >= params.max_steps_in_episode) & (params.terminal_time_limit == 0)
+        return _is_truncated(state, params)
 
     def step(
         self, key: Key, state: EnvState, action: Int[Array, ""] | int, params: EnvParams | None = None
@@ -125,14 +118,40 @@ class JRCEnv:
         """
         params = self._given(params)
         _check_step(key, state, action, params)
-        step_key, reset_key = jax.random.split(key)
-        obs, new, reward, terminated, info = self.step_env(step_key, state, action, params)
-        truncated = self.is_truncated(new, params)
-        first_obs, first = self.reset_env(reset_key, params)
-        done = terminated | truncated
-        info = {**info, "final_observation": obs, "terminated": terminated, "truncated": truncated}
-        obs, new = jax.tree.map(lambda a, b: jnp.where(done, a, b), (first_obs, first), (obs, new))
-        return obs, new, reward, terminated, truncated, info
+        return _step_with_reset(key, state, jnp.asarray(action, jnp.int32), params)
+
+
+@compiled
+def _reset(key: Key, params: EnvParams):
+    words = jax.random.bits(key, (slot.NUM_WORDS,), jnp.uint32)
+    first = slot.initial_state(words, params)
+    return states.features_of(first, params.shape), EnvState(first, jnp.int32(0), first)
+
+
+@compiled
+def _step(key: Key, state: EnvState, action: Int[Array, ""], params: EnvParams):
+    words = jax.random.bits(key, (slot.NUM_WORDS,), jnp.uint32)
+    outcome = slot.run_slot(words, state.id, action, params, state.first)
+    new = EnvState(outcome.next_state, state.time + 1, state.first)
+    info = {"event": outcome.event, "packets": outcome.packets, "miss_ratio": outcome.miss_ratio}
+    terminated = (new.time >= params.max_steps_in_episode) & (params.terminal_time_limit == 1)
+    return states.features_of(new.id, params.shape), new, outcome.reward, terminated, info
+
+
+def _is_truncated(state: EnvState, params: EnvParams) -> Bool[Array, ""]:
+    return (state.time >= params.max_steps_in_episode) & (params.terminal_time_limit == 0)
+
+
+@compiled
+def _step_with_reset(key: Key, state: EnvState, action: Int[Array, ""], params: EnvParams):
+    step_key, reset_key = jax.random.split(key)
+    obs, new, reward, terminated, info = _step(step_key, state, action, params)
+    truncated = _is_truncated(new, params)
+    first_obs, first = _reset(reset_key, params)
+    done = terminated | truncated
+    info = {**info, "final_observation": obs, "terminated": terminated, "truncated": truncated}
+    obs, new = jax.tree.map(lambda a, b: jnp.where(done, a, b), (first_obs, first), (obs, new))
+    return obs, new, reward, terminated, truncated, info
 
 
 def _check_step(key: Key, state: EnvState, action: Int[Array, ""] | int, params: EnvParams) -> None:

@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
+from jrcjax.compiled import compiled
 from jrcjax.model import states
 from jrcjax.model.params import EnvParams, of_params
 
@@ -35,6 +36,7 @@ def event_probability_at(levels: Int[Array, " F"], params: EnvParams) -> Float[A
 
 
 @of_params
+@compiled
 def event_probability(params: EnvParams) -> Float[Array, " S"]:
     """p_u in every state, [S]."""
     levels = states.levels_of(jnp.arange(params.num_states), params.shape)

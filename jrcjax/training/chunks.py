@@ -12,7 +12,7 @@ from jrcjax.learners import LearnerFactory, Source
 from jrcjax.learners.hparams import Config, HParams
 from jrcjax.model.params import EnvParams
 from jrcjax.training.footprint import check_memory
-from jrcjax.training.parallel import over_agents, pad_agents, padded
+from jrcjax.training.parallel import first_agents, over_agents, pad_agents, padded
 from jrcjax.training.rollout import AgentState, Log, check_training, init_agent, learner_for, run_episodes, spec_of
 from jrcjax.training.source import check_source
 from jrcjax.training.train import filled_in
@@ -77,7 +77,7 @@ def train_in_chunks(
         length = min(chunk, config.episodes - first)
         advance = advance if length == chunk else advanced_by(length)
         agents, log = advance((jnp.int32(first), hparams, env_params), agents)
-        logs.append(jax.tree.map(lambda leaf: leaf[:count], log))
+        logs.append(first_agents(log, count))
         on_progress(first + length, logs[-1])
     whole = jax.tree.map(lambda *leaves: jnp.concatenate(leaves, axis=1), *logs)
-    return jax.tree.map(lambda leaf: leaf[:count], agents), whole
+    return first_agents(agents, count), whole

@@ -152,6 +152,7 @@ def padded(count: int, block: int | None = None, available: int | None = None) -
     return -(-count // unit) * unit
 
 
+@functools.partial(jax.jit, static_argnums=1)  # leaf by leaf each would be some programs, and a learner has many
 def pad_agents(tree: Any, count: int) -> Any:
     """Repeats the last agent along the leading axis of every leaf up to `count` agents."""
 
@@ -159,6 +160,12 @@ def pad_agents(tree: Any, count: int) -> Any:
         return jnp.concatenate([leaf, jnp.repeat(leaf[-1:], count - leaf.shape[0], axis=0)])
 
     return jax.tree.map(pad, tree)
+
+
+@functools.partial(jax.jit, static_argnums=1)
+def first_agents(tree: Any, count: int) -> Any:
+    """The first `count` along the leading axis of every leaf: what `pad_agents` added goes."""
+    return jax.tree.map(lambda leaf: leaf[:count], tree)
 
 
 def groups(tree: Any) -> list[Any]:

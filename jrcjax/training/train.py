@@ -15,7 +15,7 @@ from jrcjax.learners.hparams import Config, HParams
 from jrcjax.model.params import EnvParams
 from jrcjax.model.presets import paper_params
 from jrcjax.training.footprint import check_memory
-from jrcjax.training.parallel import over_agents, pad_agents, padded
+from jrcjax.training.parallel import first_agents, over_agents, pad_agents, padded
 from jrcjax.training.rollout import AgentState, Log, check_training, init_agent, learner_for, run_episodes, spec_of
 from jrcjax.training.source import check_source, train_source
 from jrcjax.types import Key
@@ -111,7 +111,7 @@ def train_agents(
     paper_source = _check_or_choose_source(one_source, rule, spec, config)
     run = _many_agents(learner, spec, config)
     done = run((env_params, hparams, paper_source), pad_agents((keys, source), padded(agents)))
-    return jax.tree.map(lambda leaf: leaf[:agents], done)
+    return first_agents(done, agents)
 
 
 @functools.cache

@@ -1,12 +1,14 @@
-"""Proof that nothing was compiled meanwhile."""
+"""What was compiled meanwhile."""
 
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 import jax
 
 
 @contextmanager
-def nothing_compiles():
+def compiled_programs() -> Iterator[list[str]]:
+    """Names of the programs that are compiled, or found on disk, while the context lasts."""
     compiled = []
 
     def listen(event, _, fun_name="", **__):
@@ -16,7 +18,13 @@ def nothing_compiles():
 
     jax.monitoring.register_event_duration_secs_listener(listen)
     try:
-        yield
+        yield compiled
     finally:
         jax.monitoring.unregister_event_duration_listener(listen)
-    assert not compiled, compiled
+
+
+@contextmanager
+def nothing_compiles() -> Iterator[None]:
+    with compiled_programs() as programs:
+        yield
+    assert not programs, programs
