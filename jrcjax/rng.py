@@ -7,9 +7,11 @@ inside the innermost loop costs more on a CPU than the environment does.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from jrcjax.types import Float, Int, Key, Words
 
@@ -25,10 +27,23 @@ def bits(key: Key, shape: tuple[int, ...]) -> Words:
     data = jax.random.key_data(key)
     if data.shape != (2,):  # another generator
         return jax.random.bits(key, shape, jnp.uint32)
-    first, second = data
+    return _threefry(data[0], data[1], jnp.arange(math.prod(shape), dtype=jnp.uint32).reshape(shape))
+
+
+def bits_of_several(keys: Sequence[Key], sizes: Sequence[int]) -> Words:
+    """`bits(keys[i], (sizes[i],))` one after the other, in one loop."""
+    data = jnp.stack([jax.random.key_data(key) for key in keys])
+    if data.shape[1:] != (2,):
+        return jnp.concatenate([bits(key, (size,)) for key, size in zip(keys, sizes, strict=True)])
+    first, second = data.T[:, np.repeat(np.arange(len(keys)), sizes)]
+    counters = np.concatenate([np.arange(size, dtype=np.uint32) for size in sizes])
+    return _threefry(first, second, jnp.asarray(counters))
+
+
+def _threefry(first: Words, second: Words, counters: Words) -> Words:
     keys = (first, second, first ^ second ^ jnp.uint32(0x1BD11BDA))
-    x = jnp.broadcast_to(first, shape)
-    y = jnp.arange(math.prod(shape), dtype=jnp.uint32).reshape(shape) + second
+    x = jnp.broadcast_to(first, counters.shape)
+    y = counters + second
     for i in range(5):
         for rotation in _ROTATIONS[i % 2]:
             x = x + y

@@ -68,3 +68,10 @@ def test_bits_are_those_of_jax(shape):
 def test_bits_of_another_generator():
     key = jax.random.key(3, impl="rbg")
     np.testing.assert_array_equal(rng.bits(key, (9,)), jax.random.bits(key, (9,), jnp.uint32))
+
+
+@pytest.mark.parametrize("generator", ["threefry2x32", "rbg"])
+def test_bits_of_several_are_those_of_one_after_the_other(generator):
+    keys, sizes = jax.random.split(jax.random.key(1, impl=generator), 3), (5, 1, 32)
+    wanted = np.concatenate([rng.bits(key, (size,)) for key, size in zip(keys, sizes, strict=True)])
+    np.testing.assert_array_equal(jax.jit(lambda keys: rng.bits_of_several(list(keys), sizes))(keys), wanted)

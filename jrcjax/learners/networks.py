@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import jax
@@ -70,23 +70,32 @@ _TRUNCATED_AT = 2.0  # standard deviations
 _STD_OF_TRUNCATED = 0.87962566103423978  # of a standard normal variable between -2 and 2
 
 
-def initial_kernel(key: Key, shape: tuple[int, int], choice: Int | int = 0) -> Float:
-    """A random kernel [out, in] from the initialiser of that number in `Initialiser`, which may be traced.
+def initial_kernels(keys: Sequence[Key], shapes: Sequence[tuple[int, int]], choice: Int | int = 0) -> list[Float]:
+    """Random kernels [out, in], each from its key, by the initialiser of that number in `Initialiser`, maybe traced.
 
-    The values are those of `jax.nn.initializers`. All of them start from the same uniform numbers, so that one draw
-    serves a choice that is only known when the program runs; a draw for each would take most of the time to compile.
+    The values are those of `jax.nn.initializers`. All kernels and all initialisers start from the same uniform numbers,
+    so that one loop draws them; a draw for each would take most of the time to compile.
     """
-    fan_out, fan_in = shape
-    variance = np.array([1 / fan_in, 2 / (fan_in + fan_out), 2 / fan_in], np.float32)
-    factors = np.stack([np.sqrt(variance) / np.float32(_STD_OF_TRUNCATED), np.sqrt(3 * variance)])
-    of_normal, of_uniform = jnp.asarray(factors)[:, choice]
-    share = (rng.bits(key, shape) >> 9).astype(jnp.float32) * jnp.float32(2.0**-23)  # what jax.random.uniform gives
+    sizes = [math.prod(shape) for shape in shapes]
+    of_normal, of_uniform = (
+        jnp.asarray(np.repeat(factors, sizes, axis=1))[choice]
+        for factors in np.stack([_factors(shape) for shape in shapes], axis=-1)
+    )
+    share = (rng.bits_of_several(keys, sizes) >> 9).astype(jnp.float32) * jnp.float32(2.0**-23)  # as jax.random.uniform
     edge = jax.lax.erf(jnp.float32(_TRUNCATED_AT / math.sqrt(2)))
     normal = jnp.float32(math.sqrt(2)) * jax.lax.erf_inv(jnp.maximum(-edge, share * (2 * edge) - edge))
     inside = jnp.nextafter(jnp.float32(_TRUNCATED_AT), jnp.float32(0.0))
     normal = jnp.clip(normal, -inside, inside) * of_normal
     uniform = jnp.maximum(-1.0, share * 2.0 - 1.0) * of_uniform
-    return jnp.where(choice == Initialiser.GLOROT_UNIFORM, uniform, normal)
+    numbers = jnp.where(choice == Initialiser.GLOROT_UNIFORM, uniform, normal)
+    return [part.reshape(shape) for part, shape in zip(jnp.split(numbers, np.cumsum(sizes)[:-1]), shapes, strict=True)]
+
+
+def _factors(shape: tuple[int, int]) -> np.ndarray:
+    """What a standard normal and a uniform variable is multiplied with for each `Initialiser`, [2, 3]."""
+    fan_out, fan_in = shape
+    variance = np.array([1 / fan_in, 2 / (fan_in + fan_out), 2 / fan_in], np.float32)
+    return np.stack([np.sqrt(variance) / np.float32(_STD_OF_TRUNCATED), np.sqrt(3 * variance)])
 
 
 class ColumnDense(nn.Module):
@@ -109,7 +118,7 @@ class QNetwork(nn.Module):
 
     num_actions: int
     hidden: tuple[int, ...]
-    kernel_init: Callable = initial_kernel
+    kernel_init: Callable = nn.initializers.zeros  # what draws would be traced at each use; see `QFunction.init`
 
     @nn.compact
     def __call__(self, features: Float) -> Float:

@@ -7,16 +7,14 @@ Inside, tables have one column per state, [A, S], as the network computes them.
 
 from __future__ import annotations
 
-import functools
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-from flax import linen as nn
 
 from jrcjax.learners.base import Spec
 from jrcjax.learners.hparams import Config, HParams
-from jrcjax.learners.networks import QNetwork, initial_kernel
+from jrcjax.learners.networks import QNetwork, initial_kernels
 from jrcjax.learners.value_learning import double_q_value
 from jrcjax.model import states
 from jrcjax.types import Float, Int, Key
@@ -33,9 +31,19 @@ class QFunction(NamedTuple):
     """Whether the target network follows in small steps, for which it keeps its weights."""
 
     def init(self, key: Key, initialiser: Int | int = 0) -> Any:
-        """Random weights, from the `Initialiser` of that number."""
-        network = self.network.clone(kernel_init=functools.partial(initial_kernel, choice=initialiser))
-        return network.init(key, jnp.zeros((len(self.shape), 1), jnp.float32))
+        """Random weights, from the `Initialiser` of that number: flax hands out keys, one draw serves all."""
+        keys, shapes = [], []
+
+        def noted(key: Key, shape: tuple[int, int]) -> Float:
+            keys.append(key)
+            shapes.append(shape)
+            return jnp.zeros(shape)
+
+        features = jnp.zeros((len(self.shape), 1), jnp.float32)
+        layers: Any = self.network.clone(kernel_init=noted).init(key, features)["params"]
+        kernels = initial_kernels(keys, shapes, initialiser)
+        drawn = zip(layers.items(), kernels, strict=True)
+        return {"params": {name: {**layer, "kernel": kernel} for (name, layer), kernel in drawn}}
 
     def columns(self, weights: Any, ids: Int | None = None) -> Float:
         """Q(s, .; theta) of states [N], [A, N]; of all states if there are no ids."""
@@ -106,8 +114,7 @@ class QFunction(NamedTuple):
 def q_function(spec: Spec, config: Config) -> QFunction:
     """The network of `config` for a problem."""
     as_table = config.uses_table(states.num_states(spec.shape))
-    # Each use of the network traces its initialiser for shapes; `init` brings the one that draws.
-    network = QNetwork(spec.num_actions, config.hidden, nn.initializers.zeros)
+    network = QNetwork(spec.num_actions, config.hidden)
     return QFunction(network, spec.shape, as_table, config.target_update == "soft")
 
 
