@@ -25,14 +25,16 @@ paper = jrcjax.paper_params("target")
 params = paper.replace(radar=radar, speed=paper.speed.replace(**three), max_steps_in_episode=5)  # S = 48
 jrcjax.check_params(params)
 env, key = jrcjax.JRCEnv(params), jax.random.key(0)
-_, state = env.reset(key)
-jax.jit(jax.vmap(env.step, in_axes=(0, None, None, None)))(jax.random.split(key, 3), state, 3, params)
-exact.evaluate_policy(params, exact.optimal_policy(params))
-exact.evaluate_policy(params, exact.best_constant_action(params))
-exact.largest_reward(params), exact.transition_tensor(params), front.reachable(params)
+# Calls are checked while they are traced, so nothing need be compiled and run.
+_, state = jax.eval_shape(env.reset, key)
+jax.eval_shape(jax.vmap(env.step, in_axes=(0, None, None, None)), jax.random.split(key, 3), state, 3, params)
+jax.eval_shape(exact.evaluate_policy, params, jax.eval_shape(exact.optimal_policy, params))
+jax.eval_shape(exact.evaluate_policy, params, jax.eval_shape(exact.best_constant_action, params))
+for function in (exact.largest_reward, exact.transition_tensor, front.reachable):
+    jax.eval_shape(function, params)
 for wrong in (
-    lambda: exact.evaluate_policy(params, jnp.ones(48) / 4),
-    lambda: exact.level_transition(jnp.ones(2) / 2, jnp.ones(2)),
+    lambda: jax.eval_shape(exact.evaluate_policy, params, jnp.ones(48) / 4),
+    lambda: jax.eval_shape(exact.level_transition, jnp.ones(2) / 2, jnp.ones(2)),
 ):
     try:
         wrong()

@@ -338,14 +338,15 @@ def test_table_up_to_256_states_unless_told_otherwise():
 
 @pytest.mark.slow
 def test_ddqn_nears_the_optimum_of_the_source():
-    """Table I's source, 500 of its 1000 episodes: the greedy policies' exact long-run reward is within 5 % of the best.
+    """Table I's source, 300 of its 1000 episodes: the greedy policies' exact long-run reward is within 5 % of the best.
 
-    Policies of a seed's last hundred episodes are off by 3 % on average; 32 seeds keep chance away from the limit.
+    Policies of a seed's last hundred episodes are off by 3 % on average, with a standard deviation of 0.8 % over seeds:
+    the limit is nine standard errors of 16 seeds away.
     """
     params = jrcjax.paper_params("source")
     best = float(exact.evaluate_policy(params, exact.optimal_policy(params)).reward)
-    keys = jax.random.split(jax.random.key(2024), 32)
-    _, log = jrcjax.train_agents(keys, params, learner="ddqn", config=Config(episodes=500))
+    keys = jax.random.split(jax.random.key(2024), 16)
+    _, log = jrcjax.train_agents(keys, params, learner="ddqn", config=Config(episodes=300))
     reached = np.asarray(log.policy_reward[:, -100:])
     assert (reached <= best + 1e-4).all()  # nothing beats the optimum
     assert reached.mean() >= best - 0.05 * abs(best)
