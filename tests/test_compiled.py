@@ -65,3 +65,28 @@ def test_a_step_by_hand_costs_no_program_more():
         for action in range(PARAMS.num_actions):
             _, state, *_ = ENV.step(KEY, state, action, PARAMS)
     assert not programs
+
+
+class Doubled(jrcjax.JRCEnv):
+    """Twice the reward, and observations from 1 to 2."""
+
+    def get_obs(self, state, params=None):
+        return 1 + super().get_obs(state, params)
+
+    def step_env(self, key, state, action, params):
+        obs, state, reward, terminated, info = super().step_env(key, state, action, params)
+        return obs, state, 2 * reward, terminated, info
+
+
+def test_what_a_subclass_changes_holds_in_a_step():
+    plain, doubled = (env.step(KEY, STATE, 2, PARAMS) for env in (ENV, Doubled()))
+    np.testing.assert_array_equal(doubled[0], 1 + plain[0])
+    assert doubled[2] == 2 * plain[2] != 0
+    np.testing.assert_array_equal(Doubled().reset(KEY, PARAMS)[0], 1 + ENV.reset(KEY, PARAMS)[0])
+
+
+def test_environments_of_one_class_share_their_programs():
+    ENV.step(KEY, STATE, 2, PARAMS)
+    with compiled_programs() as programs:
+        jrcjax.JRCEnv(PARAMS).step(KEY, STATE, 2)
+    assert not programs

@@ -52,6 +52,11 @@ class JRCEnv:
         return params
 
     @property
+    def _itself(self) -> JRCEnv:
+        """What programs are compiled for: once for all of this class, and for each of a class that changes methods."""
+        return _PLAIN if type(self) is JRCEnv else self
+
+    @property
     def name(self) -> str:
         """The environment's name."""
         return "JRC"
@@ -89,7 +94,7 @@ class JRCEnv:
         """Observation and state at the start of an episode."""
         require_type("params", params, EnvParams)
         require_keys(key, 0, _ONE_KEY)
-        return _reset(key, params)
+        return _reset(self._itself, key, params)
 
     def reset(self, key: Key, params: EnvParams | None = None) -> tuple[Float[Array, " F"], EnvState]:
         """Observation and state at the start of an episode."""
@@ -100,11 +105,11 @@ class JRCEnv:
     ) -> tuple[Float[Array, " F"], EnvState, Float[Array, ""], Bool[Array, ""], dict[str, Any]]:
         """One slot without reset: (obs, state, reward, terminated, info)."""
         _check_step(key, state, action, params)
-        return _step(key, state, jnp.asarray(action, jnp.int32), params)
+        return _step(self._itself, key, state, jnp.asarray(action, jnp.int32), params)
 
     def is_truncated(self, state: EnvState, params: EnvParams) -> Bool[Array, ""]:
         """Whether the time limit cuts the episode here, without being part of the problem."""
-        return _is_truncated(state, params)
+        return (state.time >= params.max_steps_in_episode) & (params.terminal_time_limit == 0)
 
     def step(
         self, key: Key, state: EnvState, action: Int[Array, ""] | int, params: EnvParams | None = None
@@ -118,36 +123,36 @@ class JRCEnv:
         """
         params = self._given(params)
         _check_step(key, state, action, params)
-        return _step_with_reset(key, state, jnp.asarray(action, jnp.int32), params)
+        return _step_with_reset(self._itself, key, state, jnp.asarray(action, jnp.int32), params)
 
 
-@compiled
-def _reset(key: Key, params: EnvParams):
+_PLAIN = JRCEnv()
+
+
+@compiled(static_argnums=0)
+def _reset(env: JRCEnv, key: Key, params: EnvParams):
     words = jax.random.bits(key, (slot.NUM_WORDS,), jnp.uint32)
     first = slot.initial_state(words, params)
-    return states.features_of(first, params.shape), EnvState(first, jnp.int32(0), first)
+    state = EnvState(first, jnp.int32(0), first)
+    return env.get_obs(state, params), state
 
 
-@compiled
-def _step(key: Key, state: EnvState, action: Int[Array, ""], params: EnvParams):
+@compiled(static_argnums=0)
+def _step(env: JRCEnv, key: Key, state: EnvState, action: Int[Array, ""], params: EnvParams):
     words = jax.random.bits(key, (slot.NUM_WORDS,), jnp.uint32)
     outcome = slot.run_slot(words, state.id, action, params, state.first)
     new = EnvState(outcome.next_state, state.time + 1, state.first)
     info = {"event": outcome.event, "packets": outcome.packets, "miss_ratio": outcome.miss_ratio}
     terminated = (new.time >= params.max_steps_in_episode) & (params.terminal_time_limit == 1)
-    return states.features_of(new.id, params.shape), new, outcome.reward, terminated, info
+    return env.get_obs(new, params), new, outcome.reward, terminated, info
 
 
-def _is_truncated(state: EnvState, params: EnvParams) -> Bool[Array, ""]:
-    return (state.time >= params.max_steps_in_episode) & (params.terminal_time_limit == 0)
-
-
-@compiled
-def _step_with_reset(key: Key, state: EnvState, action: Int[Array, ""], params: EnvParams):
+@compiled(static_argnums=0)
+def _step_with_reset(env: JRCEnv, key: Key, state: EnvState, action: Int[Array, ""], params: EnvParams):
     step_key, reset_key = jax.random.split(key)
-    obs, new, reward, terminated, info = _step(step_key, state, action, params)
-    truncated = _is_truncated(new, params)
-    first_obs, first = _reset(reset_key, params)
+    obs, new, reward, terminated, info = env.step_env(step_key, state, action, params)
+    truncated = env.is_truncated(new, params)
+    first_obs, first = env.reset_env(reset_key, params)
     done = terminated | truncated
     info = {**info, "final_observation": obs, "terminated": terminated, "truncated": truncated}
     obs, new = jax.tree.map(lambda a, b: jnp.where(done, a, b), (first_obs, first), (obs, new))
