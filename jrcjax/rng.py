@@ -11,7 +11,6 @@ from collections.abc import Sequence
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 
 from jrcjax.types import Float, Int, Key, Words
 
@@ -32,12 +31,18 @@ def bits(key: Key, shape: tuple[int, ...]) -> Words:
 
 def bits_of_several(keys: Sequence[Key], sizes: Sequence[int]) -> Words:
     """`bits(keys[i], (sizes[i],))` one after the other, in one loop."""
-    data = jnp.stack([jax.random.key_data(key) for key in keys])
-    if data.shape[1:] != (2,):
+    data = [jax.random.key_data(key) for key in keys]
+    if data[0].shape != (2,):
         return jnp.concatenate([bits(key, (size,)) for key, size in zip(keys, sizes, strict=True)])
-    first, second = data.T[:, np.repeat(np.arange(len(keys)), sizes)]
-    counters = np.concatenate([np.arange(size, dtype=np.uint32) for size in sizes])
-    return _threefry(first, second, jnp.asarray(counters))
+    counters = jnp.concatenate([jnp.arange(size, dtype=jnp.uint32) for size in sizes])
+    return _threefry(
+        repeated([first for first, _ in data], sizes), repeated([last for _, last in data], sizes), counters
+    )
+
+
+def repeated(values: Sequence[jax.Array], sizes: Sequence[int]) -> jax.Array:
+    """Scalars, each repeated so often, as a whole: part of a loop, where NumPy's would be a constant of that size."""
+    return jnp.concatenate([jnp.broadcast_to(value, (size,)) for value, size in zip(values, sizes, strict=True)])
 
 
 def _threefry(first: Words, second: Words, counters: Words) -> Words:

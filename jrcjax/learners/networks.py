@@ -77,10 +77,8 @@ def initial_kernels(keys: Sequence[Key], shapes: Sequence[tuple[int, int]], choi
     so that one loop draws them; a draw for each would take most of the time to compile.
     """
     sizes = [math.prod(shape) for shape in shapes]
-    of_normal, of_uniform = (
-        jnp.asarray(np.repeat(factors, sizes, axis=1))[choice]
-        for factors in np.stack([_factors(shape) for shape in shapes], axis=-1)
-    )
+    factors = [jnp.asarray(_factors(shape))[:, choice] for shape in shapes]
+    of_normal, of_uniform = (rng.repeated([of_layer[i] for of_layer in factors], sizes) for i in range(2))
     share = (rng.bits_of_several(keys, sizes) >> 9).astype(jnp.float32) * jnp.float32(2.0**-23)  # as jax.random.uniform
     edge = jax.lax.erf(jnp.float32(_TRUNCATED_AT / math.sqrt(2)))
     normal = jnp.float32(math.sqrt(2)) * jax.lax.erf_inv(jnp.maximum(-edge, share * (2 * edge) - edge))
