@@ -41,7 +41,7 @@ def bits_of_several(keys: Sequence[Key], sizes: Sequence[int]) -> Words:
 
 
 def repeated(values: Sequence[jax.Array], sizes: Sequence[int]) -> jax.Array:
-    """Scalars, each repeated so often, as a whole: part of a loop, where NumPy's would be a constant of that size."""
+    """Each scalar as often as its size says, one after the other; part of the loop that reads it, never a constant."""
     return jnp.concatenate([jnp.broadcast_to(value, (size,)) for value, size in zip(values, sizes, strict=True)])
 
 

@@ -51,10 +51,9 @@ class JRCEnv:
         require_type("params", params, EnvParams)
         return params
 
-    @property
-    def _itself(self) -> JRCEnv:
-        """What programs are compiled for: once for all of this class, and for each of a class that changes methods."""
-        return _PLAIN if type(self) is JRCEnv else self
+    def _run(self, program: Any, *arguments: Any) -> Any:
+        """Runs a compiled function of environments; for a subclass, whose attributes may change, uncompiled."""
+        return program(_PLAIN, *arguments) if type(self) is JRCEnv else program.__wrapped__(self, *arguments)
 
     @property
     def name(self) -> str:
@@ -94,7 +93,7 @@ class JRCEnv:
         """Observation and state at the start of an episode."""
         require_type("params", params, EnvParams)
         require_keys(key, 0, _ONE_KEY)
-        return _reset(self._itself, key, params)
+        return self._run(_reset, key, params)
 
     def reset(self, key: Key, params: EnvParams | None = None) -> tuple[Float[Array, " F"], EnvState]:
         """Observation and state at the start of an episode."""
@@ -105,7 +104,7 @@ class JRCEnv:
     ) -> tuple[Float[Array, " F"], EnvState, Float[Array, ""], Bool[Array, ""], dict[str, Any]]:
         """One slot without reset: (obs, state, reward, terminated, info)."""
         _check_step(key, state, action, params)
-        return _step(self._itself, key, state, jnp.asarray(action, jnp.int32), params)
+        return self._run(_step, key, state, jnp.asarray(action, jnp.int32), params)
 
     def is_truncated(self, state: EnvState, params: EnvParams) -> Bool[Array, ""]:
         """Whether the time limit cuts the episode here, without being part of the problem."""
@@ -123,7 +122,7 @@ class JRCEnv:
         """
         params = self._given(params)
         _check_step(key, state, action, params)
-        return _step_with_reset(self._itself, key, state, jnp.asarray(action, jnp.int32), params)
+        return self._run(_step_with_reset, key, state, jnp.asarray(action, jnp.int32), params)
 
 
 _PLAIN = JRCEnv()

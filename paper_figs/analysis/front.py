@@ -39,9 +39,6 @@ WORTH = tuple(2.0 ** np.linspace(-4, 4, 33))
 """Factors of rho_1, what a packet earns, over which the optimum of equation (11) is followed."""
 _SETTLED = 0.1  # of the episodes, the last, over which a learner's exact policy is averaged
 
-# Compiled as a whole, once for all environments of a shape, and not operation by operation.
-_front, _long_run = jax.jit(front.front), jax.jit(exact.evaluate_policy)
-
 
 def _exact_row(panel: str, params: EnvParams, name: str, value: float, x, y) -> tuple:
     convention = MissConvention.names()[int(params.miss_convention)]
@@ -50,7 +47,7 @@ def _exact_row(panel: str, params: EnvParams, name: str, value: float, x, y) -> 
 
 def front_rows(panel: str, params: EnvParams, value: float = np.nan) -> list[tuple]:
     """The distinct corners of an environment's front."""
-    corners = np.unique(np.stack(_front(params), axis=1), axis=0)
+    corners = np.unique(np.stack(front.front(params), axis=1), axis=0)
     return [_exact_row(panel, params, "front", value, *corner) for corner in corners]
 
 
@@ -77,7 +74,7 @@ def reward_rows(params: EnvParams) -> list[tuple]:
 def random_row(params: EnvParams) -> tuple:
     """The policy that takes each action equally often, as Round Robin does too in the long run."""
     even = jnp.full((params.num_states, params.num_actions), 1.0 / params.num_actions)
-    run = _long_run(params, even)
+    run = exact.evaluate_policy(params, even)
     return _exact_row("a", params, "round_robin", np.nan, run.throughput, run.miss_detection)
 
 
