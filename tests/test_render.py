@@ -25,7 +25,7 @@ def test_the_scene_is_the_placement_behind_the_slots_miss_ratio(placements, mode
     ratios = []
     for seed in range(8):
         words = words_of(seed)
-        outcome = render._run_slot(words, jnp.int32(0), jnp.int32(params.num_rates + mode), params)
+        outcome = render._run_slot(words, jnp.int32(0), jnp.int32(params.num_rates + mode), params, jnp.int32(0))
         scene = render.scene_of(words[-1], mode, params)
         ratios.append(scene.merged.mean())
         np.testing.assert_allclose(scene.merged.mean(), outcome.miss_ratio, rtol=1e-6)

@@ -44,7 +44,7 @@ def run_slot(
     state: Int[Array, ""],
     action: Int[Array, ""],
     params: EnvParams,
-    first: Int[Array, ""] | None = None,
+    first: Int[Array, ""],
 ) -> Outcome:
     """Runs one slot.
 
@@ -53,10 +53,12 @@ def run_slot(
       state: state id, a scalar.
       action: a data rate 0..L-1 or a radar mode L..L+K-1, a scalar.
       params: the environment.
-      first: id of the episode's first state, a scalar; `state` if None.
+      first: id of the episode's first state, a scalar.
     """
     levels = states.levels_of(state, params.shape)
-    deciding = states.levels_of(_deciding_state(state, first, params), params.shape)
+    is_first = params.reward_state == RewardState.EPISODE_START
+    # Levels are chosen, not states: those of the first state are then computed once per episode.
+    deciding = jnp.where(is_first, states.levels_of(first, params.shape), levels)
     u = rng.uniform(words[:-1])
     event = u[-1] < event_probability_at(deciding, params)
     is_data = action < params.num_rates
@@ -72,13 +74,6 @@ def run_slot(
         packets=packets,
         miss_ratio=miss,
     )
-
-
-def _deciding_state(state: Int[Array, ""], first: Int[Array, ""] | None, params: EnvParams) -> Int[Array, ""]:
-    """The state that a slot's event, packets and reward belong to."""
-    if first is None:
-        return state
-    return jnp.where(params.reward_state == RewardState.EPISODE_START, first, state)
 
 
 def measure(sums: metrics.Metrics, outcome: Outcome, params: EnvParams) -> metrics.Metrics:

@@ -17,13 +17,20 @@ NUM_WORDS = slot.NUM_WORDS + exploration.NUM_WORDS
 
 
 def act_in_slot(
-    words: Words, state: Int, act: Callable[[Words], Int], last: Bool, env_params: EnvParams, discount: Float
+    words: Words,
+    state: Int,
+    first: Int,
+    act: Callable[[Words], Int],
+    last: Bool,
+    env_params: EnvParams,
+    discount: Float,
 ) -> tuple[Transition, slot.Outcome]:
     """The agent acts and the environment answers.
 
     Args:
       words: [NUM_WORDS] random words.
       state: state id, a scalar.
+      first: that of the episode's first state.
       act: random words of the action to the action.
       last: whether the slot is the episode's last.
       env_params: the environment; it says whether the episode then ends for good.
@@ -34,7 +41,7 @@ def act_in_slot(
     """
     of_slot, of_action = jnp.split(words, [slot.NUM_WORDS])
     action = act(of_action)
-    outcome = slot.run_slot(of_slot, state, action, env_params)
+    outcome = slot.run_slot(of_slot, state, action, env_params, first)
     is_terminal = last & (env_params.terminal_time_limit == 1)
     discount = jnp.where(is_terminal, 0.0, discount)
     return Transition(state, action, outcome.reward, outcome.next_state, discount), outcome

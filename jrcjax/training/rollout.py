@@ -95,6 +95,7 @@ def train_in_slot(
     words: Words,
     drawn: Any,
     number: Int,
+    first: Int,
     last: jax.Array,
     env_params: EnvParams,
     hparams: HParams,
@@ -107,6 +108,7 @@ def train_in_slot(
       words: [NUM_WORDS] random words of the slot.
       drawn: what the learner drew for its update.
       number: slots before this one, the same for all agents.
+      first: id of the episode's first state.
       last: whether the slot is the episode's last.
       env_params: the environment.
       hparams: hyperparameters.
@@ -117,7 +119,7 @@ def train_in_slot(
     def act(words: Words) -> Int:
         return learner.act(learner_state, state, number, words, hparams)
 
-    transition, outcome = act_in_slot(words, state, act, last, env_params, hparams.discount)
+    transition, outcome = act_in_slot(words, state, first, act, last, env_params, hparams.discount)
     learner_state = learner.update(learner_state, transition, number, drawn, hparams)
     return outcome.next_state, learner_state, slot.measure(sums, outcome, env_params)
 
@@ -133,11 +135,13 @@ def run_episode(
     of_slots, of_updates = jnp.split(words[:slots], [NUM_WORDS], axis=1)
     numbers = episode * slots + jnp.arange(slots)
 
+    first = slot.initial_state(words[slots, : slot.NUM_WORDS], env_params)
+
     def one_slot(carry, xs):
         words, drawn, number, i = xs
-        return train_in_slot(carry, words, drawn, number, i == slots - 1, env_params, hparams, learner), None
+        return train_in_slot(carry, words, drawn, number, first, i == slots - 1, env_params, hparams, learner), None
 
-    start = (slot.initial_state(words[slots, : slot.NUM_WORDS], env_params), agent.learner, metrics.zero())
+    start = (first, agent.learner, metrics.zero())
     (_, learner_state, sums), _ = jax.lax.scan(
         one_slot, start, (of_slots, learner.draw(of_updates, numbers), numbers, jnp.arange(slots))
     )

@@ -41,21 +41,22 @@ def demonstrate(key: Key, policy: Float, env_params: EnvParams, hparams: HParams
     slots, demonstrator = env_params.max_steps_in_episode, FixedState(policy, hparams.demonstration_epsilon)
 
     def one_slot(carry, xs):
-        state, window = carry
+        state, first, window = carry
         words, i = xs
         of_slot, of_start = jnp.split(words, [NUM_WORDS])
         position = i % slots
         state = jnp.where(position == 0, slot.initial_state(of_start, env_params), state)
+        first = jnp.where(position == 0, state, first)
 
         def act(words: Words) -> Int:
             return FIXED.act(demonstrator, state, i, words, hparams)
 
-        transition, _ = act_in_slot(of_slot, state, act, position == slots - 1, env_params, hparams.discount)
+        transition, _ = act_in_slot(of_slot, state, first, act, position == slots - 1, env_params, hparams.discount)
         window = n_step.push(window, transition, position)
-        return (transition.next_state, window), jax.tree.map(lambda field: field[0], window)
+        return (transition.next_state, first, window), jax.tree.map(lambda field: field[0], window)
 
-    start = (jnp.int32(0), n_step.init(config.n_step))
-    (_, window), complete = jax.lax.scan(one_slot, start, (words, jnp.arange(config.demonstrations)))
+    start = (jnp.int32(0), jnp.int32(0), n_step.init(config.n_step))
+    (_, _, window), complete = jax.lax.scan(one_slot, start, (words, jnp.arange(config.demonstrations)))
     # A transition is complete n - 1 slots after it happened; those of the last n - 1 slots end with the data.
     last = min(config.n_step - 1, config.demonstrations)
     return jax.tree.map(

@@ -190,7 +190,9 @@ def test_demonstrations_follow_each_other(params, count, n):
     assert_is(seen, transitions, closed_form(transitions, ends, n, 0.9))
 
 
-def test_demonstrations_obey_the_environment_and_the_policy(params):
+@pytest.mark.parametrize("reading", ["current", "episode_start"])
+def test_demonstrations_obey_the_environment_and_the_policy(params, reading):
+    params = replace(params, reward_state=jnp.int32(["current", "episode_start"].index(reading)))
     count, epsilon = 20_000, 0.01
     seen = demonstrated(params, count, 10)
     model = Model(params)
@@ -201,6 +203,10 @@ def test_demonstrations_obey_the_environment_and_the_policy(params):
     p = epsilon * (1 - 1 / model.num_actions)
     assert z((strays - count * p) / np.sqrt(count * p * (1 - p))) > ALPHA
 
+    # The state that a slot's reward belongs to.
+    slots = np.arange(count)
+    deciding = seen.state[slots if reading == "current" else slots // LENGTH * LENGTH]
+
     # Every reward is one of those that equation (11) allows, and their mean is right.
     possible = np.full((len(model.states), model.num_actions, 2 + model.miss_bank.shape[1]), np.nan)
     for s, a in np.ndindex(possible.shape[:2]):
@@ -208,10 +214,10 @@ def test_demonstrations_obey_the_environment_and_the_policy(params):
         rewards = [model.reward(model.is_data[a], True, model.packets[s, a], miss) for miss in misses]
         possible[s, a, : len(rewards)] = rewards
         possible[s, a, -1] = model.reward(model.is_data[a], False, model.packets[s, a], 1.0)
-    distance = np.abs(possible[seen.state, seen.action] - seen.reward[:, None])
+    distance = np.abs(possible[deciding, seen.action] - seen.reward[:, None])
     assert (np.nanmin(distance, axis=1) <= 1e-5 * np.abs(model.weights).max()).all()
-    excess = (seen.reward - model.expected_reward()[seen.state, seen.action]).sum()
-    assert z(excess / np.sqrt(model.reward_variance()[seen.state, seen.action].sum())) > ALPHA
+    excess = (seen.reward - model.expected_reward()[deciding, seen.action]).sum()
+    assert z(excess / np.sqrt(model.reward_variance()[deciding, seen.action].sum())) > ALPHA
 
     # States within episodes follow equation (10); episodes begin with the prior, wherever the last one ended.
     counts = np.zeros((len(model.states), len(model.states)))

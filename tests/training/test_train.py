@@ -12,6 +12,7 @@ from sources import random_source
 import jrcjax
 from jrcjax.learners import LEARNERS
 from jrcjax.learners.base import Learner
+from jrcjax.learners.fixed import FIXED, FixedState
 from jrcjax.learners.hparams import Config, HParams
 from jrcjax.model import metrics, slot
 from jrcjax.replay.uniform import Transition
@@ -131,12 +132,13 @@ def naive_q_learning(key, params, num_episodes: int, epsilon_slots: float) -> di
     for episode in range(num_episodes):
         words = words_of_episode(key, episode, slot.NUM_WORDS + 2)
         state = int(slot.initial_state(jnp.asarray(words[SLOTS, : slot.NUM_WORDS]), params))
-        outcomes = []
+        first, outcomes = state, []
         for i in range(SLOTS):
             epsilon = 1 - 0.99 * min((episode * SLOTS + i) / epsilon_slots, 1)
             explores = (int(words[i, -2]) >> 8) / 2**24 < epsilon
             action = (int(words[i, -1]) * 4) >> 32 if explores else int(q[state].argmax())
-            outcome = run_slot(words[i, : slot.NUM_WORDS], jnp.int32(state), jnp.int32(action), params)
+            of_slot = words[i, : slot.NUM_WORDS]
+            outcome = run_slot(of_slot, jnp.int32(state), jnp.int32(action), params, jnp.int32(first))
             outcomes.append(outcome)
             reward, following = float(outcome.reward), int(outcome.next_state)
             visits[state, action] += 1
@@ -149,8 +151,10 @@ def naive_q_learning(key, params, num_episodes: int, epsilon_slots: float) -> di
     return log | {"q": q, "visits": visits}
 
 
+@pytest.mark.parametrize("reading", ["current", "episode_start"])
 @pytest.mark.parametrize("seed", [0, 1, 2])
-def test_q_learning_against_a_plain_loop(params, seed):
+def test_q_learning_against_a_plain_loop(params, seed, reading):
+    params = params.replace(reward_state=reading)
     key = jax.random.key(seed)
     state, log = trained("q_learning", Config(episodes=6))(key, params, hparams_of(epsilon_slots=60.0))
     twin = naive_q_learning(key, params, 6, 60.0)
@@ -159,6 +163,21 @@ def test_q_learning_against_a_plain_loop(params, seed):
     np.testing.assert_allclose(state.learner.q, twin["q"], rtol=0, atol=120 * 3 * 6e-8 * 100)
     for name in ("reward", "throughput", "miss_detection"):
         np.testing.assert_allclose(getattr(log, name), twin[name], rtol=1e-5, atol=1e-5)
+
+
+def test_policies_earn_what_they_are_worth_whatever_state_decides(params):
+    """A policy is simulated in the environment in which it is judged."""
+    policy = jrcjax.exact.optimal_policy(params)
+    agent = rollout.AgentState(jax.random.key(8), FixedState(policy, jnp.float32(0)))
+    run = jax.jit(lambda env: rollout.run_episodes(agent, 0, 4000, env, HParams(), FIXED)[1])
+    worth = []
+    for reading in ("current", "episode_start"):
+        log = run(params.replace(reward_state=reading))
+        sample, exact = np.asarray(log.reward), float(log.policy_reward[0])
+        error = sample.std() / np.sqrt(len(sample))
+        assert abs(sample.mean() - exact) < 4 * error
+        worth.append(exact)
+    assert worth[0] - worth[1] > 20 * error  # so a simulation of the other reading would show
 
 
 @pytest.mark.parametrize("learner", LEARNERS)
