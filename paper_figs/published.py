@@ -68,8 +68,8 @@ def worth(tried: pd.DataFrame) -> pd.DataFrame:
 
 
 def of_multiverse(tried: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """The readings that no search proposed, by their numbers: those with a trade-off, and those without."""
-    sample = tried.loc[~tried.reading.str.startswith("search")]
+    """The readings of the sample, by their numbers: those with a trade-off, and those without."""
+    sample = tried.loc[~tried.reading.str.startswith("search") & (tried.reading != DEFAULT)]
     sample = sample.set_index(sample.reading.map(_number))
     with_one = worth(sample)
     return with_one, sample.drop(with_one.index)
@@ -77,7 +77,7 @@ def of_multiverse(tried: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 def _number(reading: str) -> int:
     """The number in the multiverse of a reading of it."""
-    return 0 if reading == DEFAULT else int(reading.rpartition(" ")[2])
+    return int(reading.rpartition(" ")[2])
 
 
 def held(published: Path, sample: pd.DataFrame, claim: str) -> str:
@@ -106,6 +106,12 @@ def named(reading: str) -> str:
     """A reading as sentences name it: "reading 17 of the multiverse", or "the default"."""
     study, _, number = reading.rpartition(" ")
     return f"reading {number} of the {study}" if study else f"the {reading}"
+
+
+def promising(confirmed: pd.DataFrame) -> str:
+    """The seeds that the search went by, as sentences name them: "single seed", "2 seeds"."""
+    most = int(confirmed.promised_seeds.max())
+    return "single seed" if most == 1 else f"{most} seeds"
 
 
 def counted(best: pd.DataFrame) -> str:

@@ -22,7 +22,9 @@ from paper_figs.published import (
     csv_of,
     named,
     names,
+    of_multiverse,
     pair,
+    promising,
     short,
     tried_in,
     values_of,
@@ -55,8 +57,11 @@ def _nowhere(tried: pd.DataFrame, closest: pd.DataFrame) -> str:
     claims = closest.claim[closest.holds == 0]
     if claims.empty:
         return ""
-    most = float(proportion_effect(0, len(tried) - _searched(tried)).high)
-    share = f"in none of the {len(tried)} readings, so in at most {percent(most)} of the space"
+    most = float(proportion_effect(0, sum(map(len, of_multiverse(tried)))).high)
+    share = (
+        f"in none of the {len(tried)} readings, so in at most {percent(most)} of the space (each by itself, and as if "
+        "readings of a block were independent)"
+    )
     return f"On their side {share}: {names(claims)}."
 
 
@@ -135,7 +140,7 @@ def best_list(published: Path) -> str:
     agreement = tried.set_index("reading").agreement
     sentences = [
         f"Of {len(tried)} readings, {_searched(tried)} of them proposed by the search, {named(name)} agrees best with "
-        f"the text: its single seed promised {int(best.promised.sum())} of {len(best)} statements (agreement "
+        f"the text: its {promising(best)} promised {int(best.promised.sum())} of {len(best)} statements (agreement "
         f"{percent(agreement[name])}, default {percent(agreement[DEFAULT])}), and {int(best.n_seeds.max())} fresh "
         f"seeds gave {int(best.holds.sum())} (agreement {percent(multiverse.agreement(best).mean())}): "
         f"{counted(best)}.",

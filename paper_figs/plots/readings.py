@@ -157,10 +157,10 @@ def draw_search(tried: pd.DataFrame, confirmed: pd.DataFrame, least_loss: float)
     way.legend(fontsize=6, ncol=2, loc="lower center", bbox_to_anchor=(0.5, 1.0))
     best = confirmed.loc[[("all" in what.split()) for what in confirmed.best_for]]
     number = np.array([claim.split(" ")[0] for claim in best.claim])
-    seeds = int(best.n_seeds.max())
+    seeds, before = int(best.n_seeds.max()), int(best.promised_seeds.max())
     places = {name: place for place, name in enumerate(dict.fromkeys(number))}
     for column, colour, shift, label in (
-        ("promised", _GREY, -0.2, "promised by one seed"),
+        ("promised", _GREY, -0.2, "promised by one seed" if before == 1 else f"promised by {before} seeds"),
         ("holds", _BLUE, 0.2, f"{seeds} fresh seeds"),
     ):
         held = best[column].to_numpy(bool)

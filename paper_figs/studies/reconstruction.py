@@ -259,6 +259,7 @@ def confirmed_table(chosen: list[Choice], confirmed: list[pd.DataFrame]) -> pd.D
             "claim": of.claim,
             "promised_value": promised.value.to_numpy(),
             "promised": promised.holds.to_numpy(bool),
+            "promised_seeds": promised.n_seeds.to_numpy(int),
             **{name: of[name] for name in ("value", "ci_low", "ci_high", "verdict", "negligible", "n_seeds")},
             "holds": of.holds.astype(bool),
         }

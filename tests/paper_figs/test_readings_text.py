@@ -73,13 +73,14 @@ def search_tables():
         for name, agreement, value, lost in (
             ("default", 0.2, 0.5, 0.08),
             ("multiverse 3", 0.4, 0.5, 0.0),
+            ("multiverse 5", 0.3, 0.5, 0.06),
             ("search 0", 0.6, 0.25, 0.0),
             ("search 1", 0.5, 0.5, 0.05),
         )
     ]
 
     def seen(reading, best_for, claim, promised, value, low, high, verdict):
-        row = {"reading": reading, "best_for": best_for, "claim": claim, "promised_value": 1.0, "promised": promised}
+        row = {"reading": reading, "best_for": best_for, "claim": claim, "promised_value": 1.0, "promised": promised, "promised_seeds": 1}
         row |= {"value": value, "ci_low": low, "ci_high": high, "verdict": verdict}
         return row | {"n_seeds": 100, "holds": verdict == "supported"}
 
@@ -283,7 +284,7 @@ def test_a_statement_holds_by_the_answers_that_decide_it(published):
 
 def test_promise_and_confirmation_stand_side_by_side(published):
     text = " ".join(reconstruction_text.best_list(published).split())
-    assert "Of 4 readings, 2 of them proposed by the search, reading 0 of the search agrees best with the" in text
+    assert "Of 5 readings, 2 of them proposed by the search, reading 0 of the search agrees best with the" in text
     assert "promised 3 of 7 statements (agreement 60 %, default 20 %), and 100 fresh seeds gave 1 " in text
     assert "gave 1 (agreement 20 %): 1 supported, 5 contradicted, 1 undecided." in text
     assert "The best of those that the search proposed agrees 60 %, more than the best of the design, 40 %." in text
@@ -292,15 +293,15 @@ def test_promise_and_confirmation_stand_side_by_side(published):
     world = "its optimal policy sends at most 0 packets per episode (default: 200), and one action in every state earns"
     assert f"{world} at most 25 % less (default: 25 %): no trade-off is left to learn." in text
     assert "fresh seeds in the other readings support: C5 (highest)." in text
-    assert "in none of the 4 readings, so in at most 77.6 % of the space: C11." in text
+    assert "in none of the 5 readings, so in at most 77.6 % of the space (each by itself, and as" in text
     assert "in none of those that were run with them: C4; C7 (TLwD); C7 (DPR); C7 (DDQN)." in text
     assert "5 seeds support none in the 2 readings of the multiverse with verdicts, so they would in at most 10" in text
     assert "; but 25 % of these verdicts are undecided: C4." in text
     first_page = " ".join(reconstruction_text.search_list(published).split())
-    assert "Of 4 readings, 2 of them from a search, reading 0 of the search agreed most with the text:" in first_page
+    assert "Of 5 readings, 2 of them from a search, reading 0 of the search agreed most with the text:" in first_page
     assert "of 7 statements 1 supported, 5 contradicted, 1 undecided by 100 fresh seeds ([all](docs/" in first_page
     assert "with C3 (TLwD) supported; C5 (highest) contradicted." in first_page
-    assert "in none of the 4 readings, so in at most 77.6 % of the space: C11." in first_page  # 1 - 0.05 ** (1 / 2)
+    assert "in none of the 5 readings, so in at most 77.6 % of the space (each by itself" in first_page  # 1 - 0.05 ** (1 / 2)
     rows = reconstruction_text.confirmed_table(published).splitlines()[2:]
     assert (
         "| C5 (highest) | 2 of 4 | 1, 0.5 (0.4 to 0.6): contradicted | 1, 2 (1.5 to 2.5): supported | search 1 "
@@ -314,15 +315,19 @@ def test_promise_and_confirmation_stand_side_by_side(published):
 
 def test_where_there_is_a_trade_off_and_what_fits_best_there(published):
     text = " ".join(trade_off_text.trade_off_list(published).split())
-    assert "In 50 % (" in text  # of the default and one reading of a multiverse
+    assert "In 50 % (" in text  # of two readings of a multiverse, the default left out
     assert (
-        "no single action is optimal in the target: the best one loses at least 8 %; in all others at most 0 %." in text
+        "no single action is optimal in the target: the best one loses at least 6 %; in all others at most 0 %." in text
     )
     assert "no reading has a trade-off: `env.reward_state` episode_start. Of the 1 readings without them 1 have" in text
     assert (
-        "Of all 2 readings with a trade-off, those of the search included, reading 1 of the search agrees best" in text
+        "Of all 3 readings with a trade-off, those of the search included, reading 1 of the search agrees best" in text
     )
     assert "its single seed promised 1 of 2 statements (agreement 50 %), and 100 fresh seeds gave 1 " in text
+    file = published / "reconstruction" / "confirmed.csv"
+    pd.read_csv(file).assign(promised_seeds=2).to_csv(file, index=False)
+    for texts in (trade_off_text.trade_off_list, reconstruction_text.best_list):
+        assert "its 2 seeds promised" in " ".join(texts(published).split())
     assert "and in those without one: C3 (TLwD) in 0 % (0 to 95) and 100 % (5 to 100);" in text  # of a reading each
     assert "1 supported, 1 contradicted, 0 undecided. It has one of the Huber loss in the target and Table" in text
     assert text.endswith("Supported: C5 (highest).")
@@ -369,8 +374,8 @@ def test_a_world_where_each_statement_holds_somewhere(published):
         "Each statement's estimate holds in some reading, C4's in 1. Fresh seeds support 2 of 7 in some."
     )
     text = " ".join(reconstruction_text.best_list(published).split())
-    assert "Each statement's estimate is on its side in some of the 4 readings." in text
-    assert "in none of the 4 readings" not in text
+    assert "Each statement's estimate is on its side in some of the 5 readings." in text
+    assert "in none of the 5 readings" not in text
 
 
 def test_what_is_not_yet_run_with_fresh_seeds_is_said(published):
