@@ -23,7 +23,8 @@ from sweeps.sweep import SMOKE
 SIZE = replace(SMOKE, seeds=1)
 SOON = {"hparams.epsilon_slots": 300.0}
 """What learners know shows after an episode."""
-METRICS = ("reward", "throughput", "miss_detection", "policy_reward")
+SIMULATED = ("reward", "throughput", "miss_detection")
+METRICS = (*SIMULATED, "policy_reward")
 
 
 def another(where: Range) -> float:
@@ -70,6 +71,9 @@ def test_a_question_acts_on_those_who_read_it_alone(results):
         assert in_target <= set(itertools.product(readers, metrics)), question.path
         assert {name.split(".")[1] for name in weights} <= set(readers), question.path
         assert in_target or weights, question.path
+        if question.path.startswith("env.") and not (question.learners or question.metrics):
+            for simulated in in_source, in_target:  # what happens changes, not only what is computed of it
+                assert simulated & {("round_robin", name) for name in SIMULATED}, question.path
         of_source = ("ddqn", "q_learning") if question.path == SOURCE else readers
         assert {name for name, _ in in_source} <= set(of_source), question.path
 
