@@ -9,6 +9,11 @@ import pytest
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 PAGES = sorted(DOCS.rglob("*.md"))
+READMES = [ROOT / "README.md", ROOT / "paper_figs" / "README.md", ROOT / "benchmarks" / "README.md"]
+TEXTS = [*PAGES, *READMES, ROOT / "CONTRIBUTING.md"]
+CODE = re.compile(r"^```.*?^```|`[^`\n]+`", re.DOTALL | re.MULTILINE)
+ON_THE_SITE_ALONE = {"results.md"}  # links of docs/explanation/readings.md
+LINK = re.compile(r"\]\((?!https?:)([^)#\s]*)(?:#([^)\s]+))?\)")
 BLOCK = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
 NEEDS = {"other_libraries.md": "gymnasium"}
 WITH_CODE = [page for page in PAGES if BLOCK.search(page.read_text())]
@@ -16,6 +21,17 @@ WITH_CODE = [page for page in PAGES if BLOCK.search(page.read_text())]
 
 def name_of(page):
     return page.relative_to(DOCS).as_posix()
+
+
+def path_of(text):
+    return text.relative_to(ROOT).as_posix()
+
+
+def anchors_of(page):
+    """Of each heading, as a reader of the repository and of the site finds it."""
+    text = CODE.sub(lambda match: "" if match[0].startswith("```") else match[0], page.read_text())
+    headings = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
 @pytest.mark.parametrize("page", WITH_CODE, ids=name_of)
@@ -43,11 +59,24 @@ def test_files_that_pages_name_exist(page):
     assert [path for path in paths if not (ROOT / path).exists()] == []
 
 
+@pytest.mark.parametrize("text", TEXTS, ids=path_of)
+def test_links_lead_somewhere_in_the_repository(text):
+    """The site rewrites them (docs/hooks.py), and building it fails where one leads nowhere there."""
+    dead = []
+    for path, anchor in LINK.findall(CODE.sub("", text.read_text())):
+        if path in ON_THE_SITE_ALONE:
+            continue
+        target = (text.parent / path).resolve() if path else text
+        if not target.exists() or (anchor and anchor not in anchors_of(target)):
+            dead.append(f"{path}#{anchor}")
+    assert dead == []
+
+
 def test_every_page_has_its_place_in_the_site():
     placed = set(re.findall(r": ([\w/-]+\.md)$", (ROOT / "mkdocs.yml").read_text(), re.MULTILINE))
     made = set(re.findall(r'^    "([\w/-]+\.md)":', (DOCS / "hooks.py").read_text(), re.MULTILINE))
-    assert {name_of(page) for page in PAGES} <= placed
-    assert placed <= {name_of(page) for page in PAGES} | made
+    assert len(made) == 3
+    assert placed == {name_of(page) for page in PAGES} | made
 
 
 def test_deviations_are_numbered_and_their_fields_exist():
