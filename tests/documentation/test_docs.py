@@ -6,6 +6,8 @@ from pathlib import Path
 import matplotlib as mpl
 import pytest
 
+from sweeps.studies.registry import STUDIES
+
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 PAGES = sorted(DOCS.rglob("*.md"))
@@ -25,6 +27,10 @@ def name_of(page):
 
 def path_of(text):
     return text.relative_to(ROOT).as_posix()
+
+
+def targets():
+    return set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
 
 
 def anchors_of(page):
@@ -51,12 +57,13 @@ def test_there_is_code_to_run():
     assert len(WITH_CODE) >= 9
 
 
-@pytest.mark.parametrize("page", PAGES, ids=name_of)
-def test_files_that_pages_name_exist(page):
-    text = page.read_text()
+@pytest.mark.parametrize("text", TEXTS, ids=path_of)
+def test_files_that_texts_name_exist(text):
     folders = "jrcjax|sweeps|paper_figs|explorer|benchmarks|examples|tests|docs|published"
-    paths = re.findall(rf"`((?:{folders})/[\w./-]+)`", text)
-    assert [path for path in paths if not (ROOT / path).exists()] == []
+    paths = re.findall(rf"`((?:{folders})/[\w./*-]+)`", text.read_text())
+    if text in READMES:  # pages name files of their reader's, too
+        paths += re.findall(r"`([\w/]+\.py)`", text.read_text())
+    assert [path for path in paths if not list(ROOT.glob(path))] == []
 
 
 @pytest.mark.parametrize("text", TEXTS, ids=path_of)
@@ -88,6 +95,21 @@ def test_deviations_are_numbered_and_their_fields_exist():
 
 
 def test_commands_that_pages_name_are_targets():
-    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
-    for page in [*PAGES, ROOT / "README.md"]:
-        assert set(re.findall(r"`?make ([a-z][a-z-]+)", page.read_text())) <= targets | {"it", "the", "up"}
+    for text in TEXTS:
+        assert set(re.findall(r"`?make ([a-z][a-z-]+)", text.read_text())) <= targets() | {"it", "the", "up"}
+
+
+def test_the_page_of_commands_has_them_all():
+    page = (DOCS / "reference" / "commands.md").read_text()
+    assert targets() == set(re.findall(r"`make ([a-z-]+)`", page))
+    modules = {".".join(path.parent.relative_to(ROOT).parts) for path in ROOT.glob("[!.]*/**/__main__.py")}
+    assert {"paper_figs.calibration", "sweeps"} < modules
+    assert [module for module in modules if f"python -m {module}" not in page] == []
+    figures = {name for name in STUDIES if name.startswith("fig")}
+    assert [name for name in ({"fig5a", "fig9"} | set(STUDIES) - figures) if f"`{name}`" not in page] == []
+
+
+def test_the_jax_for_a_gpu_is_the_locked_one():
+    (locked,) = re.findall(r"^jax==(\S+)", (ROOT / "requirements.lock").read_text(), re.MULTILINE)
+    named = re.findall(r"jax\[\w+\](?:==)?([\d.]*)", (DOCS / "how-to" / "install.md").read_text())
+    assert named == [locked]
