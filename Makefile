@@ -67,7 +67,7 @@ sweeps: $(STAMP)  ## run parameter sweeps
 	$(PY) -m sweeps $(ARGS)
 
 docs: $(STAMP) $(DOCS_STAMP)  ## build the documentation into site/
-	NO_MKDOCS_2_WARNING=1 $(PY) -m mkdocs build --quiet --strict --clean --site-dir site
+	NO_MKDOCS_2_WARNING=1 $(PY) -m mkdocs build --strict --clean --site-dir site
 
 $(DOCS_STAMP): $(STAMP)
 	@echo "installing what builds the documentation into $(VENV)"

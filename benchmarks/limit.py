@@ -1,4 +1,4 @@
-"""Measures what share of a DDQN step the dense products of one update would take on their own.
+"""Claim: the dense products of one update, on their own, take more than half of a DDQN step.
 
 Each product of the paper's network (hidden layers of 24) on all 32 states runs alone, batched over the agents of a
 block as in training, on all devices. In another form it may be faster or slower: these are the forms that are used.

@@ -18,7 +18,7 @@ from sweeps.studies.readings import SOURCE
 from sweeps.studies.reconstruction import NAME
 
 FIGURES = "figures"
-"""The published figures under the default readings."""
+"""The published figures under the default reading."""
 
 
 def csv_of(published: Path, study: str, name: str) -> pd.DataFrame:

@@ -170,13 +170,13 @@ def points_list(figure: str, published: Path) -> str:
 
 
 def headline(published: Path) -> str:
-    """The first page's sentences on the default readings."""
+    """The first page's sentences on the default reading."""
     found = {j.claim: j for j in judgements(published)}
     numbers, verdict = _numbers(published)["fig5b"], {claim: words.verdict(j) for claim, j in found.items()}
     counts = Counter(j.verdict for j in found.values())
     tally = ", ".join(f"{counts[each]} are {each}" for each in VERDICTS)
     text = (
-        f"Of the {len(found)} statements that the paper's claims come down to, {tally} under the default readings. "
+        f"Of the {len(found)} statements that the paper's claims come down to, {tally} under the default reading. "
         f"That TLwD converges faster than DDQN is {verdict['C3 (TLwD)']}; that it earns most at every point of Fig. 6 "
         f"is {verdict['C5 (highest)']}, of Fig. 8 {verdict['C13 (highest)']}. After episode 400 the policies in the "
         f"target are below the exact optimum by: {_gaps_of(numbers, 'late', ('tlwd', 'dpr', 'ddqn'))}."

@@ -85,8 +85,8 @@ def _best_with_trade_off(tried: pd.DataFrame, best: pd.DataFrame) -> str:
         return f"{agrees} the text; its fresh seeds are still to come."
     values, supported = values_of(tried, name), best.claim[best.verdict == "supported"]
     return (
-        f"{agrees} the text: its {promising(best)} promised {int(best.promised.sum())} of {len(best)} statements (agreement "
-        f"{percent(values['agreement'])}), and {int(best.n_seeds.max())} fresh seeds gave {int(best.holds.sum())} "
+        f"{agrees} the text: its {promising(best)} promised {int(best.promised.sum())} of {len(best)} "
+        f"statements (agreement {percent(values['agreement'])}), and {int(best.n_seeds.max())} fresh seeds gave {int(best.holds.sum())} "
         f"(agreement {percent(multiverse.agreement(best).mean())}): {counted(best)}. {pair(values)} "
         f"{_imitated(values, values_of(tried, DEFAULT))} Supported: {names(supported)}."
     )

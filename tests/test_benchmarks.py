@@ -5,6 +5,7 @@ import threading
 
 import pytest
 
+from benchmarks.__main__ import NAMES, _claim_of
 from benchmarks.measure import Case, NotMeasured, Ready, Running, in_turns, print_table
 
 
@@ -54,3 +55,8 @@ def test_the_other_cases_are_measured(capsys):
     printed = capsys.readouterr().out
     assert all(case.name in printed for case in cases)
     assert printed.count("not measured") == 3
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_each_file_opens_with_the_claim_that_it_tests(name):
+    assert _claim_of(name).startswith("Claim: ")

@@ -30,7 +30,7 @@ Every setting with its type, its value in Table I, and its meaning. Made from th
 
 Types: float and int are arrays of one number, or of one per level [J], data rate [L], radar mode [K], class of objects
 [C] or placement [B]; all of them may be traced and vmapped over. What is static decides shapes or code. In a parameter
-file (`jrcjax.load_params`) and in Python fields have these names, and readings may go by name. In
+file (`jrcjax.load_params`) and in Python fields have these names, and named choices may go by name. In
 `python -m sweeps run custom --vary PATH=VALUES` a path is `env.` or `hparams.`, the dotted field, and an index for each
 axis: `env.speed.event_probability.1`, or `.high` where there are two levels. `env.all.prior.0` is that entry of every
 factor.

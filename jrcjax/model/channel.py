@@ -14,7 +14,7 @@ class Channel(Container):
     prior: Float[Array, " J"] = number(DISTRIBUTION)
     """Probability of each level."""
     persistence: Float[Array, ""] = number(BELOW_ONE, default=0.0)
-    """Reading A10: kappa, the probability that the level stays as it is instead of being drawn anew."""
+    """Deviation A10: kappa, the probability that the level stays as it is instead of being drawn anew."""
     received_power: Float[Array, ""] = number(POSITIVE, "W")
     """P_R of equation (1)."""
     interference: Float[Array, " J"] = number(NOT_NEGATIVE, "W")

@@ -38,9 +38,9 @@ class Factor(Container):
     prior: Float[Array, " J"] = number(DISTRIBUTION)
     """tau_j, the probability of each level; equation (3)."""
     event_probability: Float[Array, " J"] = number(PROBABILITY)
-    """p_j, the probability of an unexpected event at each level; equation (4), and reading A2 for the speed."""
+    """p_j, the probability of an unexpected event at each level; equation (4), and deviation A2 for the speed."""
     persistence: Float[Array, ""] = number(BELOW_ONE, default=0.0)
-    """Reading A10: kappa, the probability that the level stays as it is instead of being drawn anew."""
+    """Deviation A10: kappa, the probability that the level stays as it is instead of being drawn anew."""
 
 
 class EnvParams(Container):
@@ -55,15 +55,15 @@ class EnvParams(Container):
     reward_weights: Float[Array, " 4"] = number(NOT_NEGATIVE)
     """(rho_1, rho_2, rho_3, rho_4) of equation (11)."""
     event_model: Int[Array, ""] = reading(EventModel)
-    """Reading A1: how the factors add up to the probability of an event."""
+    """Deviation A1: how the factors add up to the probability of an event."""
     miss_convention: Int[Array, ""] = reading(MissConvention)
-    """Reading A4: which slots count for the probability of miss detection."""
+    """Deviation A4: which slots count for the probability of miss detection."""
     count_event_packets: Int[Array, ""] = flag(default=True)
-    """Reading A3: whether packets sent in a slot with an event count as throughput."""
+    """Deviation A3: whether packets sent in a slot with an event count as throughput."""
     terminal_time_limit: Int[Array, ""] = flag(default=False)
-    """Reading A11: whether the time limit is a terminal state, and not a truncation."""
+    """Deviation A11: whether the time limit is a terminal state, and not a truncation."""
     reward_state: Int[Array, ""] = reading(RewardState)
-    """Reading A26: which state a slot's event, packets and reward belong to."""
+    """Deviation A26: which state a slot's event, packets and reward belong to."""
     max_steps_in_episode: int = count(default=300)
     """Slots per episode."""
 

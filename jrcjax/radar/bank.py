@@ -37,7 +37,7 @@ class Radar(Modes):
     """K radar modes, the objects around the vehicle, and the bank of placements that slots draw from."""
 
     placements: str = option(PLACEMENTS)
-    """Reading A7: a slot draws from the bank, or places its objects afresh."""
+    """Deviation A7: a slot draws from the bank, or places its objects afresh."""
     bank_size: int = count(default=4096)
     """B, the number of placements per mode in the bank."""
     bank_seed: Int[Array, ""] = integer(NOT_NEGATIVE, default=0)

@@ -61,11 +61,11 @@ class Modes(Container):
     size_std: Float[Array, "C 2"] = number(NOT_NEGATIVE, "m")
     """Standard deviation of length and width of each class of objects."""
     distance: Int[Array, ""] = reading(Distance)
-    """Reading A5: which distance between two objects counts."""
+    """Deviation A5: which distance between two objects counts."""
     counting_rule: Int[Array, ""] = reading(CountingRule)
-    """Reading A5: which objects count as detected."""
+    """Deviation A5: which objects count as detected."""
     count_model: Int[Array, ""] = reading(CountModel)
-    """Reading A6: how many objects a placement has."""
+    """Deviation A6: how many objects a placement has."""
     max_objects: tuple[int, ...] = setting(_check_max_objects, default=None)
     """Slots for objects in each mode, at least: there are more where a density that is known needs them. If a density
     is traced and needs more, miss ratios are NaN, never silently smaller."""

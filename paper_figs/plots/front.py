@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -15,6 +16,9 @@ _SIZE = (style.TWO_COLUMNS[0], 4.9)
 _VARIED = {"b": r"$\omega$", "c": "$p_1^v$", "d": r"$\tau_0$"}
 _LINES = {"all_slots": "-", "event_slots": (0, (4.0, 1.5))}
 _CONVENTIONS = {"all_slots": "over all slots", "event_slots": "over slots with an event"}
+_HEIGHT = (0.0, 1.02)
+_INSET = (0.56, 0.1, 0.4, 0.36)
+"""Left, bottom, width and height, as shares of the panel's."""
 _LABELS = ("throughput (packets per slot)", "miss-detection probability")
 
 
@@ -31,7 +35,7 @@ def draw(numbers: pd.DataFrame, title: str) -> Figure:
     for panel, axes in panels.items():
         axes.set_xlabel(_LABELS[0])
         axes.set_ylabel(_LABELS[1])
-        axes.set_ylim(0.0, 1.02)
+        axes.set_ylim(_HEIGHT)
         axes.set_title(f"({panel})")
     seeds = int(numbers.n_seeds.max())
     figure.suptitle(f"{title} ({f'{seeds} seeds, bars: 95 % interval' if seeds > 1 else 'one seed'})")
@@ -76,15 +80,19 @@ def _draw_point(axes: Axes, point: Any, look: style.Look, labelled: str) -> None
 
 
 def _enlarge(axes: Axes, numbers: pd.DataFrame) -> None:
-    """Enlarges where the learners are."""
+    """Enlarges where the learners are, unless they are all over the panel."""
     learners = numbers.query("n_seeds > 0")
-    inset = axes.inset_axes((0.56, 0.1, 0.4, 0.36))
-    _draw_target(inset, numbers)
     low_x, high_x = learners[["x", "x_low"]].min().min(), learners[["x", "x_high"]].max().max()
     low_y, high_y = learners[["mean", "ci_low"]].min().min(), learners[["mean", "ci_high"]].max().max()
     margin_x, margin_y = 0.05 + 0.4 * (high_x - low_x), 0.01 + 0.4 * (high_y - low_y)
-    inset.set_xlim(low_x - margin_x, high_x + margin_x)
-    inset.set_ylim(low_y - margin_y, high_y + margin_y)
+    x, y = (low_x - margin_x, high_x + margin_x), (low_y - margin_y, high_y + margin_y)
+    _, _, width, height = _INSET
+    if np.ptp(x) > width * np.ptp(axes.get_xlim()) or np.ptp(y) > height * np.ptp(_HEIGHT):
+        return
+    inset = axes.inset_axes(_INSET)
+    _draw_target(inset, numbers)
+    inset.set_xlim(x)
+    inset.set_ylim(y)
     inset.tick_params(labelsize=6)
     axes.indicate_inset_zoom(inset, edgecolor="0.4", linewidth=0.6)
 

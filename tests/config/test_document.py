@@ -26,7 +26,7 @@ def test_a_meaning_is_the_docstring_under_the_field():
     assert document.fields_of(HParams)["step_constant"].startswith("If positive, Q-learning's step size instead")
     assert (
         document.fields_of(EnvParams)["event_model"]
-        == "Reading A1: how the factors add up to the probability of an event."
+        == "Deviation A1: how the factors add up to the probability of an event."
     )
     assert document.fields_of(EnvParams)["road"] == ""
 

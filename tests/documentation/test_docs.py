@@ -6,9 +6,15 @@ from pathlib import Path
 import matplotlib as mpl
 import pytest
 
+from sweeps.studies.registry import STUDIES
+
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 PAGES = sorted(DOCS.rglob("*.md"))
+READMES = [ROOT / "README.md", ROOT / "paper_figs" / "README.md", ROOT / "benchmarks" / "README.md"]
+TEXTS = [*PAGES, *READMES, ROOT / "CONTRIBUTING.md"]
+CODE = re.compile(r"^```.*?^```|`[^`\n]+`", re.DOTALL | re.MULTILINE)
+LINK = re.compile(r"\]\((?!https?:)([^)#\s]*)(?:#([^)\s]+))?\)")
 BLOCK = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
 NEEDS = {"other_libraries.md": "gymnasium"}
 WITH_CODE = [page for page in PAGES if BLOCK.search(page.read_text())]
@@ -16,6 +22,21 @@ WITH_CODE = [page for page in PAGES if BLOCK.search(page.read_text())]
 
 def name_of(page):
     return page.relative_to(DOCS).as_posix()
+
+
+def path_of(text):
+    return text.relative_to(ROOT).as_posix()
+
+
+def targets():
+    return set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+
+
+def anchors_of(page):
+    """Of each heading, as a reader of the repository and of the site finds it."""
+    text = CODE.sub(lambda match: "" if match[0].startswith("```") else match[0], page.read_text())
+    headings = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
 @pytest.mark.parametrize("page", WITH_CODE, ids=name_of)
@@ -35,19 +56,31 @@ def test_there_is_code_to_run():
     assert len(WITH_CODE) >= 9
 
 
-@pytest.mark.parametrize("page", PAGES, ids=name_of)
-def test_files_that_pages_name_exist(page):
-    text = page.read_text()
+@pytest.mark.parametrize("text", TEXTS, ids=path_of)
+def test_files_that_texts_name_exist(text):
     folders = "jrcjax|sweeps|paper_figs|explorer|benchmarks|examples|tests|docs|published"
-    paths = re.findall(rf"`((?:{folders})/[\w./-]+)`", text)
-    assert [path for path in paths if not (ROOT / path).exists()] == []
+    paths = re.findall(rf"`((?:{folders})/[\w./*-]+)`", text.read_text())
+    if text in READMES:  # pages name files of their reader's, too
+        paths += re.findall(r"`([\w/]+\.py)`", text.read_text())
+    assert [path for path in paths if not list(ROOT.glob(path))] == []
+
+
+@pytest.mark.parametrize("text", TEXTS, ids=path_of)
+def test_links_lead_somewhere_in_the_repository(text):
+    """The site rewrites them (docs/hooks.py), and building it fails where one leads nowhere there."""
+    dead = []
+    for path, anchor in LINK.findall(CODE.sub("", text.read_text())):
+        target = (text.parent / path).resolve() if path else text
+        if not target.exists() or (anchor and anchor not in anchors_of(target)):
+            dead.append(f"{path}#{anchor}")
+    assert dead == []
 
 
 def test_every_page_has_its_place_in_the_site():
     placed = set(re.findall(r": ([\w/-]+\.md)$", (ROOT / "mkdocs.yml").read_text(), re.MULTILINE))
     made = set(re.findall(r'^    "([\w/-]+\.md)":', (DOCS / "hooks.py").read_text(), re.MULTILINE))
-    assert {name_of(page) for page in PAGES} <= placed
-    assert placed <= {name_of(page) for page in PAGES} | made
+    assert len(made) == 3
+    assert placed == {name_of(page) for page in PAGES} | made
 
 
 def test_deviations_are_numbered_and_their_fields_exist():
@@ -59,6 +92,21 @@ def test_deviations_are_numbered_and_their_fields_exist():
 
 
 def test_commands_that_pages_name_are_targets():
-    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
-    for page in [*PAGES, ROOT / "README.md"]:
-        assert set(re.findall(r"`?make ([a-z][a-z-]+)", page.read_text())) <= targets | {"it", "the", "up"}
+    for text in TEXTS:
+        assert set(re.findall(r"`?make ([a-z][a-z-]+)", text.read_text())) <= targets() | {"it", "the", "up"}
+
+
+def test_the_page_of_commands_has_them_all():
+    page = (DOCS / "reference" / "commands.md").read_text()
+    assert targets() == set(re.findall(r"`make ([a-z-]+)`", page))
+    modules = {".".join(path.parent.relative_to(ROOT).parts) for path in ROOT.glob("[!.]*/**/__main__.py")}
+    assert {"paper_figs.calibration", "sweeps"} < modules
+    assert [module for module in modules if f"python -m {module}" not in page] == []
+    figures = {name for name in STUDIES if name.startswith("fig")}
+    assert [name for name in ({"fig5a", "fig9"} | set(STUDIES) - figures) if f"`{name}`" not in page] == []
+
+
+def test_the_jax_for_a_gpu_is_the_locked_one():
+    (locked,) = re.findall(r"^jax==(\S+)", (ROOT / "requirements.lock").read_text(), re.MULTILINE)
+    named = re.findall(r"jax\[\w+\](?:==)?([\d.]*)", (DOCS / "how-to" / "install.md").read_text())
+    assert named == [locked]

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from paper_figs.calibration import simulate
+from paper_figs.calibration import draw, simulate
 from paper_figs.calibration.__main__ import main
 from paper_figs.calibration.reach import BEYOND, COVERAGE, FALSE_VERDICTS, FEWEST, SEEDS
 from paper_figs.calibration.worlds import WORLDS
@@ -78,3 +78,13 @@ def test_the_command_writes_table_and_figure(tmp_path, monkeypatch):
     assert {path.name for path in tmp_path.iterdir()} == {f"calibration.{end}" for end in ("csv", "pdf", "png")}
     columns = {"rule", "world", "n_seeds", "coverage", "false_supported", "false_contradicted", "out_of_reach"}
     assert columns <= set(pd.read_csv(tmp_path / "calibration.csv").columns)
+
+
+def test_what_is_beyond_a_panel_stands_at_its_end_with_its_value(published):
+    worst = published.assign(false=published[FALSE].max(axis=1)).query("n_seeds >= 5 and false > 0.12")
+    errors, coverage = draw.draw(published).axes
+    assert sorted(text.get_text() for text in errors.texts) == sorted(f"{100 * share:.3g}" for share in worst.false)
+    assert len(worst) == 2
+    assert len(coverage.texts) == 0
+    assert all(errors.get_xlim()[0] < text.xy[0] < errors.get_xlim()[1] for text in errors.texts)
+    assert len({text.xy for text in errors.texts}) == 2

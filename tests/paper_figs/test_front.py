@@ -1,6 +1,9 @@
 """The figure of the trade-off: its numbers and its picture."""
 
+from pathlib import Path
+
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 
@@ -8,6 +11,8 @@ from jrcjax import exact
 from paper_figs.analysis import front
 from paper_figs.plots import front as picture
 from paper_figs.plots import style
+
+PUBLISHED = Path(__file__).parents[2] / "published"
 
 
 @pytest.fixture(scope="module")
@@ -58,3 +63,11 @@ def test_each_panel_moves_one_parameter(numbers):
 def test_picture(numbers, tmp_path):
     pdf, png = style.save(picture.draw(numbers, front.TITLE), tmp_path / front.NAME)
     assert (pdf.read_bytes()[:4], png.read_bytes()[:4]) == (b"%PDF", b"\x89PNG")
+
+
+@pytest.mark.parametrize(("folder", "insets"), [("figures", 1), ("best", 0)])
+def test_learners_are_enlarged_where_they_are_close_together(folder, insets):
+    """In the best reading they are all over the panel, where an inset would show less than the panel itself."""
+    first, *others = picture.draw(pd.read_csv(PUBLISHED / folder / "front.csv"), front.TITLE).axes
+    assert len(first.child_axes) == insets
+    assert not any(panel.child_axes for panel in others)

@@ -222,7 +222,9 @@ def test_short_range_misses_less(target, source):
 
 
 _miss_ratios = jax.jit(
-    jax.vmap(lambda words, action, params: slot.run_slot(words, 0, action, params, 0).miss_ratio, in_axes=(0, None, None))
+    jax.vmap(
+        lambda words, action, params: slot.run_slot(words, 0, action, params, 0).miss_ratio, in_axes=(0, None, None)
+    )
 )
 
 
