@@ -87,8 +87,8 @@ def _best_with_trade_off(tried: pd.DataFrame, best: pd.DataFrame) -> str:
     return (
         f"{agrees} the text: its {promising(best)} promised {int(best.promised.sum())} of {len(best)} "
         f"statements (agreement {percent(values['agreement'])}), and {int(best.n_seeds.max())} fresh seeds gave "
-        f"{int(best.holds.sum())} (agreement {percent(multiverse.agreement(best).mean())}): {counted(best)}. {pair(values)} "
-        f"{_imitated(values, values_of(tried, DEFAULT))} Supported: {names(supported)}."
+        f"{int(best.holds.sum())} (agreement {percent(multiverse.agreement(best).mean())}): {counted(best)}. "
+        f"{pair(values)} {_imitated(values, values_of(tried, DEFAULT))} Supported: {names(supported)}."
     )
 
 
