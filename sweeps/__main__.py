@@ -175,15 +175,20 @@ def _study(command: Run, preset: str) -> Study:
 
 
 def _multiverse(command: Run) -> Study:
-    """The readings asked for: all, or with --keep those that the summary does not have, or is undecided about."""
+    """The readings asked for: all, or with --keep those that the summary does not have, or is undecided about.
+
+    Without --keep a summary that is there is replaced, so it may not tell of more than this run does.
+    """
     from sweeps.studies import multiverse
 
     which, selection = (command.readings, command.smoke, command.first), multiverse.Selection(command.per_block)
+    size = size_of(command.seeds, command.episodes, "paper", command.smoke, multiverse.MULTIVERSE)
     if not command.keep:
         if command.undecided is not None:
             refuse("keep", False, "True beside --undecided, which adds seeds to what a summary says of other readings")
-        return multiverse.study_of(*which, selection)
-    size = size_of(command.seeds, command.episodes, "paper", command.smoke, multiverse.MULTIVERSE)
+        study = multiverse.study_of(*which, selection)
+        multiverse.require_nothing_lost(command.out, study.sweeps, size)
+        return study
     if command.undecided is None:
         multiverse.require_summary(command.out, size)
         finished = _found(_FINISHED)(command.out, size.seeds)
