@@ -90,7 +90,7 @@ def publish_figures(out: Path, target: Path, preset: str = Size.preset) -> list[
     n_seeds = json.loads((out / "claims.json").read_text(encoding="utf-8"))[0]["n_seeds"]
     results = {figure.name: figure.results(folder, n_seeds) for figure in FIGURES}
     numbers = target / "numbers.json"
-    write_text(numbers, json.dumps(numbers_of(results), indent=2, allow_nan=False) + "\n")
+    write_text(numbers, json.dumps(numbers_of(results, preset), indent=2, allow_nan=False) + "\n")
     return [*written, numbers]
 
 

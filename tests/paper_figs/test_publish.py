@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 import worlds
 
+import jrcjax
+from jrcjax import exact
 from paper_figs import pipeline, publish, readme
 from paper_figs.claims.judge import as_json
 from paper_figs.claims.table import CLAIMS, claims_of
@@ -65,6 +67,16 @@ def test_quoted_numbers_are_those_of_the_results():
     np.testing.assert_allclose(numbers["fig5b"]["first_gap_dpr"], 0.5, atol=1e-3)
     assert numbers["fig5a"]["c1_at_0.05"] == "supported"
     json.dumps(numbers, allow_nan=False)
+
+
+def test_quoted_numbers_of_a_preset_are_those_of_its_environment():
+    data = {"fig5a": worlds.as_the_paper_says(seeds=5, episodes=450)["fig5a"]}
+    numbers = {preset: numbers_of(data, preset)["fig5a"] for preset in ("paper", "paper_table")}
+    for preset, found in numbers.items():
+        params = jrcjax.paper_params("source", preset)
+        best = exact.optimal_policy(params)
+        assert found["states_that_transmit"] == float(best[:, : params.num_rates].sum())
+    assert numbers["paper"]["mean_value"] != numbers["paper_table"]["mean_value"]
 
 
 def test_figures_that_were_not_made_have_no_verdicts_in_the_file():
