@@ -51,6 +51,9 @@ class _Drawn(NamedTuple):
     """A figure that has been written, and what the files about all of them need of it."""
 
     results: xr.Dataset
+    """Of all learners that were run."""
+    shown: xr.Dataset
+    """Of those in the picture."""
     manifest: str
     files: list[Path]
     pictures: dict[str, Path]
@@ -88,7 +91,7 @@ def make_figures(
     drawn = {name: drawing_of[name].result() for name in wanted}
     return [
         *(file for each in drawn.values() for file in each.files),
-        *_write_tables({name: each.results for name, each in drawn.items()}, size, out),
+        *_write_tables({name: each.shown for name, each in drawn.items()}, size, out),
         *_write_verdicts(drawn, rules, size, out),
     ]
 
@@ -96,14 +99,15 @@ def make_figures(
 def _draw(figure: PaperFigure, folder: Path, size: Size, out: Path) -> _Drawn:
     """Writes a figure; with Fig. 5(b) what policies can reach in the target, which is no figure of the paper."""
     data = figure.results(folder, size.seeds)
-    table = figure.table(data, slots_of(size.preset))
+    shown = figure.shown(data)
+    table = figure.table(shown, slots_of(size.preset))
     written = {figure.title: _write(table, figure.draw(table, figure.title), out / figure.name)}
     if figure.name == "fig5b":
         table = front.table(environment_of("target", size.preset), data, _exact_front(size.preset))
         written[front.TITLE] = _write(table, front_plot.draw(table, front.TITLE), out / front.NAME)
     files = [file for of_one in written.values() for file in of_one]
     manifest = (folder / figure.name / store.MANIFEST).read_text(encoding="utf-8")
-    return _Drawn(data, manifest, files, {title: of_one[-1] for title, of_one in written.items()})
+    return _Drawn(data, shown, manifest, files, {title: of_one[-1] for title, of_one in written.items()})
 
 
 @functools.lru_cache

@@ -13,12 +13,13 @@ from matplotlib.colors import to_rgb
 from matplotlib.text import Text
 from worlds import Learner
 
-from paper_figs import NUMBERS, report
+from paper_figs import NUMBERS, pipeline, report
 from paper_figs.__main__ import main
 from paper_figs.analysis import divergence, statistics
 from paper_figs.analysis.intervals import mean_effect
 from paper_figs.figures import FIGURES
 from paper_figs.plots import curves, points, style
+from sweeps.results import store
 from sweeps.sweep import Size
 
 SLOTS = 300
@@ -169,6 +170,25 @@ def test_drawn_points_are_the_table():
         for name, look in style.EXACT.items() | {n: style.LOOKS[n] for n in ("tlwd", "dpr", "ddqn")}.items():
             wanted = table.query(f"panel == {panel!r} and algorithm == {name!r}")
             np.testing.assert_allclose(lines[look.label].get_ydata(), wanted["mean"])
+
+
+def test_claims_are_judged_from_all_learners_that_were_run_and_pictures_show_their_own(tmp_path, monkeypatch):
+    never = dict.fromkeys(("tlwd", "dpr", "ddqn", "round_robin"), Learner(worlds.NEVER, 0.5))
+    learners = never | {"q_learning": Learner(50, 0.5)}  # converges, and is in neither picture
+    axes = {"fig6": ("high_speed_event_probability", worlds.TENTHS), "fig9": ("prioritised", (1.0, 0.0))}
+    judged = {}
+    for figure in (figure for figure in FIGURES if figure.name in axes):
+        data = worlds.study(learners, 4.0, *axes[figure.name], seeds=6)
+        monkeypatch.setattr(store, "load", lambda folder, seeds, data=data: data)
+        (tmp_path / figure.name).mkdir()
+        (tmp_path / figure.name / store.MANIFEST).write_text("{}")
+        drawn = pipeline._draw(figure, tmp_path, Size(seeds=6), tmp_path)
+        judged |= {j.claim: j for j in pipeline.judgements_of({figure.name: drawn.results})}
+        expected = {"tlwd", "tlwd_uniform"} if figure.name == "fig9" else {"tlwd", "dpr", "ddqn"}
+        assert set(pd.read_csv(tmp_path / f"{figure.name}.csv").algorithm) == expected | set(style.EXACT)
+    # As in a study of many readings: somebody converges, so that the others never do is known.
+    assert judged["C7 (DDQN)"].verdict == "contradicted"
+    assert judged["C15 (episodes)"].reason == "the interval of 6 seeds holds the limit"
 
 
 def test_one_algorithm_at_two_points_gives_two_curves():
