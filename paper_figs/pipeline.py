@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from rich.console import Console
 
 from jrcjax.files import write_text
-from paper_figs import check_numbers, report
+from paper_figs import check_numbers, record, report
 from paper_figs.analysis import divergence, front, ranking, regret
 from paper_figs.claims.delta import Delta
 from paper_figs.claims.judge import Judgement, as_json
@@ -74,6 +74,7 @@ def make_figures(
     rules.delta.check()
     out.mkdir(parents=True, exist_ok=True)
     folder = results_folder(out, size)
+    record.remove(out)
     sweeps = [SWEEPS[name] for name in wanted]
     seconds = expected_seconds(plan(sweeps, size, folder), folder)
     console.print(
@@ -93,6 +94,7 @@ def make_figures(
         *(file for each in drawn.values() for file in each.files),
         *_write_tables({name: each.shown for name, each in drawn.items()}, size, out),
         *_write_verdicts(drawn, rules, size, out),
+        record.write(out, record.record_of(size, wanted, rules.delta)),
     ]
 
 

@@ -112,6 +112,9 @@ def test_one_command_writes_everything(tmp_path, capsys):
     assert {"figure", "panel", "algorithm", "x", "mean", "ci_low", "ci_high", "n_seeds"} <= set(table.columns)
     assert set(table.n_seeds) == {0, 3}
     assert {row["claim"] for row in json.loads((out / "claims.json").read_text())} > {"C1 (reached)"}
+    made = json.loads((out / "made.json").read_text())
+    assert (made["preset"], made["episodes"], made["seeds"]) == ("paper", 20, 3)
+    assert made["figures"] == ["fig5a", "fig5b"]
     page = (out / "report.html").read_text()
     assert "data:image/png;base64," in page
     assert "http" not in page.replace(
