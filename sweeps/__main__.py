@@ -130,6 +130,8 @@ def _run(command: Command) -> int:
     size.check()
     sweeps = study.smoke_sweeps if command.smoke and study.smoke_sweeps else study.sweeps
     require_integer("wait", command.wait, 0)
+    if command.wait != Run.wait and not _has_cluster(command):
+        refuse("wait", command.wait, "a number of seconds beside --scheduler or --workers, for which alone it is")
     options = {"resume": command.resume, "save_agents": command.save_agents, "patience": command.wait}
     with interrupts.terminable(), _client(command) as client:
         run = functools.partial(run_sweep, size=size, out=command.out, console=console, **options, client=client)
@@ -202,9 +204,14 @@ def _multiverse(command: Run) -> Study:
     return study
 
 
+def _has_cluster(command: Run) -> bool:
+    """Whether a cluster's workers compute."""
+    return command.scheduler is not None or command.workers is not None
+
+
 def _client(command: Run) -> contextlib.AbstractContextManager:
     """The client of the cluster that the command asks for, None if it asks for none."""
-    if command.scheduler is None and command.workers is None:
+    if not _has_cluster(command):
         return contextlib.nullcontext()
     from sweeps.engine.distributed import client_of
 
