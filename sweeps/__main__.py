@@ -100,7 +100,8 @@ def main(args: list[str] | None = None) -> int:
     try:
         return _run(command)
     except KeyboardInterrupt:
-        print(interrupts.how_to_go_on("--resume"), file=sys.stderr)
+        flags = ("--resume",) if isinstance(command, Run) else ()
+        print(interrupts.how_to_go_on(*flags), file=sys.stderr)
         return interrupts.STATUS
     except (ValueError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
@@ -226,9 +227,9 @@ def _verify(command: Verify) -> int:
     differ = 0
     for part, differences in verify.verify(command.folder, command.parts, EVERY_SWEEP):
         differ += bool(differences)
-        print(f"{part.path}: {'differs' if differences else 'the same, bit for bit'}")
+        print(f"{part.path}: {'differs' if differences else 'the same, bit for bit'}", flush=True)
         for line in differences and [*differences, *verify.made_elsewhere(part)]:
-            print(f"  {line}")
+            print(f"  {line}", flush=True)
     return min(differ, 1)
 
 
