@@ -39,9 +39,22 @@ def speed_world():
     return worlds.as_the_paper_says(seeds=6, episodes=40)["fig6"]
 
 
-@pytest.mark.parametrize(("episodes", "width"), [(1000, 10), (20, 1), (100, 1), (150, 2), (101, 101)])
-def test_bins_divide_the_episodes_and_give_at_most_a_hundred_points(episodes, width):
+@pytest.mark.parametrize(("episodes", "width"), [(1000, 10), (20, 1), (100, 1), (150, 2), (101, 2), (997, 10)])
+def test_bins_are_the_smallest_that_give_at_most_a_hundred_points(episodes, width):
     assert statistics.bins_of(episodes) == width
+    values = np.random.default_rng(0).normal(size=(3, episodes)).astype(np.float32)
+    means = statistics.bin_means(values, width)
+    assert means.shape == (3, -(-episodes // width))
+    whole = episodes // width
+    # Bit for bit, whether or not there are more episodes than whole bins have.
+    np.testing.assert_array_equal(means[:, :whole], values[:, : whole * width].reshape(3, -1, width).mean(axis=2))
+    if rest := episodes % width:
+        np.testing.assert_allclose(means[:, -1], values[:, -rest:].mean(axis=1), rtol=1e-6)
+
+
+def test_a_prime_number_of_episodes_is_drawn_as_a_curve():
+    table = curves.table(results(episodes=997), "5", "a")
+    assert set(table.groupby("algorithm").x.agg(tuple)) == {(*range(10, 991, 10), 997)}
 
 
 def test_table_holds_bin_means_over_seeds_and_the_exact_optimum():
