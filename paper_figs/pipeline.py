@@ -93,7 +93,7 @@ def make_figures(
     return [
         *(file for each in drawn.values() for file in each.files),
         *_write_tables({name: each.shown for name, each in drawn.items()}, size, out),
-        *_write_verdicts(drawn, rules, size, out),
+        *_write_verdicts(drawn, rules, size, out, numbers),
         record.write(out, record.record_of(size, wanted, rules.delta)),
     ]
 
@@ -136,13 +136,15 @@ def judgements_of(results: dict[str, xr.Dataset], rules: Rules | None = None) ->
     return [judgement for judgement in claims_of(results, rules) if judgement.n_seeds]
 
 
-def _write_verdicts(drawn: dict[str, _Drawn], rules: Rules, size: Size, out: Path) -> list[Path]:
+def _write_verdicts(
+    drawn: dict[str, _Drawn], rules: Rules, size: Size, out: Path, numbers: tuple[int, ...]
+) -> list[Path]:
     results = {name: each.results for name, each in drawn.items()}
     judgements = judgements_of(results, rules)
     optima = [row for name, data in results.items() for row in report.optimum_rows(name, data)]
     diverged = [row for name, data in results.items() for row in divergence.rows(name, data)]
     pictures = {title: path for each in drawn.values() for title, path in each.pictures.items()}
     manifests = {name: each.manifest for name, each in drawn.items()}
-    page = report.render(size, pictures, judgements, optima, diverged, manifests)
+    page = report.render(size, pictures, judgements, optima, diverged, manifests, numbers, rules.delta)
     claims = json.dumps(as_json(judgements), indent=2, allow_nan=False) + "\n"
     return [write_text(out / name, text) for name, text in {"claims.json": claims, "report.html": page}.items()]
