@@ -11,8 +11,8 @@ from packaging.utils import canonicalize_name
 ROOT = Path(__file__).resolve().parent.parent
 PYTHONS = ("3.11", "3.12", "3.13")
 # Clients and peers, whose PyTorch differs between platforms and sources, the reader of one data set, and what the
-# documentation and the explorer need, which come on top.
-NOT_LOCKED = {"peers", "clients", "gymnasium", "nuscenes", "docs", "explorer"}
+# documentation needs, which come on top.
+NOT_LOCKED = {"peers", "clients", "gymnasium", "nuscenes", "docs"}
 HASH = re.compile(r"--hash=sha256:[0-9a-f]{64}(?=\s|$)")
 
 
@@ -43,8 +43,9 @@ def main() -> int:
             continue
         locked.setdefault(canonicalize_name(requirement.name), []).append(requirement)
 
-    wanted = list(project["dependencies"])
-    for name, extra in project.get("optional-dependencies", {}).items():
+    wanted, extras = list(project["dependencies"]), project.get("optional-dependencies", {})
+    errors += [f"not an extra of pyproject.toml: {name}" for name in sorted(NOT_LOCKED - extras.keys())]
+    for name, extra in extras.items():
         if name not in NOT_LOCKED:
             wanted += extra
     for requirement in map(Requirement, wanted):

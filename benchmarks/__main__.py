@@ -13,6 +13,7 @@ from typing import Annotated
 
 import tyro
 
+from benchmarks.measure import NotMeasured
 from jrcjax.files import write_text
 from sweeps.options import FLAGS, File
 
@@ -44,7 +45,7 @@ class Options:
 
 
 def main(args: list[str] | None = None) -> int:
-    """Entry point; returns the exit status."""
+    """Entry point; returns the exit status, 1 if a benchmark could not be measured."""
     options = tyro.cli(Options, prog="python -m benchmarks", args=args, config=FLAGS)
     from jrcjax.provenance import machine, versions
 
@@ -55,15 +56,20 @@ def main(args: list[str] | None = None) -> int:
     if options.json is not None and not _is_writable(options.json):
         print(f"error: json: {str(options.json)!r}; allowed: a file in an existing folder", file=sys.stderr)
         return 2
-    results = []
+    results, failed = [], 0
     for name in options.names or ("throughput",):
         module = importlib.import_module(f"benchmarks.{name}")
         print(f"\n== {name}: {_claim_of(name)}.", flush=True)
-        results += module.run(options.quick)
-    if options.json is not None:
-        content = {"machine": machine() | {"versions": versions()}, "results": [asdict(result) for result in results]}
-        write_text(options.json, json.dumps(content, indent=2) + "\n")
-    return 0
+        try:
+            results += module.run(options.quick)
+        except NotMeasured as error:
+            print(f"{name}: not measured: {error}", file=sys.stderr, flush=True)
+            failed = 1
+        if options.json is not None:  # after each, since the next may take long, or fail
+            made = machine() | {"versions": versions()}
+            content = {"machine": made, "results": [asdict(result) for result in results]}
+            write_text(options.json, json.dumps(content, indent=2) + "\n")
+    return failed
 
 
 def _is_writable(file: Path) -> bool:

@@ -5,7 +5,8 @@ algorithm on flashbax's buffer.
 All on the paper's source environment, with Table I's sizes, an update in every step, and full memories. Every case runs
 in a process of its own, compiled and warmed up before the first measurement; then one repetition of each in turn. Peers
 run at the best of several numbers of agents; those in JAX run with XLA as it is, and again, as NAME_flags, with the
-flags that this package sets (not in a quick run). The README has the numbers of a run.
+flags that this package sets (not in a quick run). The numbers of a run are in
+docs/explanation/performance.md.
 """  # noqa: D205
 
 from __future__ import annotations

@@ -30,11 +30,14 @@ class PaperFigure:
     draw: Callable[[pd.DataFrame, str], Figure]
     """Plotted numbers and title to picture."""
     learners: tuple[str, ...] = ()
-    """Which of the sweep's it shows; all if empty."""
+    """Which of the sweep's it shows; all if empty. Claims are judged from all in any case."""
 
     def results(self, folder: Path, seeds: int) -> xr.Dataset:
-        """What it shows of results in a folder of sweeps, in memory; see `store.load`."""
-        data = store.load(folder / self.name, seeds)
+        """Its sweep's results in a folder of sweeps, of all learners, in memory; see `store.load`."""
+        return store.load(folder / self.name, seeds)
+
+    def shown(self, data: xr.Dataset) -> xr.Dataset:
+        """What it shows of these results."""
         return data.sel(algorithm=list(self.learners)) if self.learners else data
 
 

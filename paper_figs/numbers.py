@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 
 import numpy as np
 import xarray as xr
 
 from jrcjax import exact
-from jrcjax.model.presets import paper_params
 from paper_figs.analysis.convergence import TOLERANCE, gaps
 from paper_figs.analysis.scores import mean_over_episodes
 from paper_figs.claims.results import Rules
 from paper_figs.claims.table import claims_of_figure
+from sweeps.preset import environment_of
+from sweeps.sweep import Size
 
 TOLERANCES = (0.01, 0.03, 0.05)
 """Gaps that could count as optimal, to show how far verdicts depend on the choice."""
 Numbers = dict[str, float | str]
 
 
-def numbers_of(figures: Mapping[str, xr.Dataset]) -> dict[str, Numbers]:
-    """The quoted numbers of each figure that is there, by name."""
-    makers = {"fig5a": of_source, "fig5b": of_target}
+def numbers_of(figures: Mapping[str, xr.Dataset], preset: str = Size.preset) -> dict[str, Numbers]:
+    """The quoted numbers of each figure that is there, by name; `preset` is what they were run with."""
+    makers = {"fig5a": functools.partial(of_source, preset=preset), "fig5b": of_target}
     return {name: makers[name](data) for name, data in figures.items() if name in makers}
 
 
@@ -52,9 +54,9 @@ def _of_environment(data: xr.Dataset) -> Numbers:
     }
 
 
-def of_source(data: xr.Dataset) -> Numbers:
+def of_source(data: xr.Dataset, preset: str = Size.preset) -> Numbers:
     """Fig. 5(a): the environment, the learners, and verdicts at other tolerances."""
-    params = paper_params("source")
+    params = environment_of("source", preset)
     best = exact.optimal_policy(params)
     late = gaps(data, "ddqn")[:, 400:]
     found = _of_environment(data) | _of_learners(data)

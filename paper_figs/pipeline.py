@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from rich.console import Console
 
 from jrcjax.files import write_text
-from paper_figs import check_numbers, report
+from paper_figs import check_numbers, record, report
 from paper_figs.analysis import divergence, front, ranking, regret
 from paper_figs.claims.delta import Delta
 from paper_figs.claims.judge import Judgement, as_json
@@ -51,6 +51,9 @@ class _Drawn(NamedTuple):
     """A figure that has been written, and what the files about all of them need of it."""
 
     results: xr.Dataset
+    """Of all learners that were run."""
+    shown: xr.Dataset
+    """Of those in the picture."""
     manifest: str
     files: list[Path]
     pictures: dict[str, Path]
@@ -71,6 +74,7 @@ def make_figures(
     rules.delta.check()
     out.mkdir(parents=True, exist_ok=True)
     folder = results_folder(out, size)
+    record.remove(out)
     sweeps = [SWEEPS[name] for name in wanted]
     seconds = expected_seconds(plan(sweeps, size, folder), folder)
     console.print(
@@ -88,22 +92,24 @@ def make_figures(
     drawn = {name: drawing_of[name].result() for name in wanted}
     return [
         *(file for each in drawn.values() for file in each.files),
-        *_write_tables({name: each.results for name, each in drawn.items()}, size, out),
-        *_write_verdicts(drawn, rules, size, out),
+        *_write_tables({name: each.shown for name, each in drawn.items()}, size, out),
+        *_write_verdicts(drawn, rules, size, out, numbers),
+        record.write(out, record.record_of(size, wanted, rules.delta)),
     ]
 
 
 def _draw(figure: PaperFigure, folder: Path, size: Size, out: Path) -> _Drawn:
     """Writes a figure; with Fig. 5(b) what policies can reach in the target, which is no figure of the paper."""
     data = figure.results(folder, size.seeds)
-    table = figure.table(data, slots_of(size.preset))
+    shown = figure.shown(data)
+    table = figure.table(shown, slots_of(size.preset))
     written = {figure.title: _write(table, figure.draw(table, figure.title), out / figure.name)}
     if figure.name == "fig5b":
         table = front.table(environment_of("target", size.preset), data, _exact_front(size.preset))
         written[front.TITLE] = _write(table, front_plot.draw(table, front.TITLE), out / front.NAME)
     files = [file for of_one in written.values() for file in of_one]
     manifest = (folder / figure.name / store.MANIFEST).read_text(encoding="utf-8")
-    return _Drawn(data, manifest, files, {title: of_one[-1] for title, of_one in written.items()})
+    return _Drawn(data, shown, manifest, files, {title: of_one[-1] for title, of_one in written.items()})
 
 
 @functools.lru_cache
@@ -130,13 +136,15 @@ def judgements_of(results: dict[str, xr.Dataset], rules: Rules | None = None) ->
     return [judgement for judgement in claims_of(results, rules) if judgement.n_seeds]
 
 
-def _write_verdicts(drawn: dict[str, _Drawn], rules: Rules, size: Size, out: Path) -> list[Path]:
+def _write_verdicts(
+    drawn: dict[str, _Drawn], rules: Rules, size: Size, out: Path, numbers: tuple[int, ...]
+) -> list[Path]:
     results = {name: each.results for name, each in drawn.items()}
     judgements = judgements_of(results, rules)
     optima = [row for name, data in results.items() for row in report.optimum_rows(name, data)]
     diverged = [row for name, data in results.items() for row in divergence.rows(name, data)]
     pictures = {title: path for each in drawn.values() for title, path in each.pictures.items()}
     manifests = {name: each.manifest for name, each in drawn.items()}
-    page = report.render(size, pictures, judgements, optima, diverged, manifests)
+    page = report.render(size, pictures, judgements, optima, diverged, manifests, numbers, rules.delta)
     claims = json.dumps(as_json(judgements), indent=2, allow_nan=False) + "\n"
     return [write_text(out / name, text) for name, text in {"claims.json": claims, "report.html": page}.items()]

@@ -20,8 +20,11 @@ from typing import Annotated
 
 import tyro
 
+from jrcjax.checks import refuse
 from jrcjax.files import write_text
+from paper_figs import record
 from paper_figs.analysis import front
+from paper_figs.claims.delta import Delta
 from paper_figs.figures import FIGURES
 from paper_figs.numbers import numbers_of
 from paper_figs.pipeline import results_folder
@@ -68,6 +71,8 @@ def texts(root: Path) -> list[Path]:
 def publish_figures(out: Path, target: Path, preset: str = Size.preset) -> list[Path]:
     """Copies figures, tables, verdicts and manifests, and writes the numbers that texts quote.
 
+    Nothing is written unless all is there, and of the run that the manifests describe.
+
     Args:
       out: what `make figures` wrote.
       target: folder of published figures.
@@ -77,21 +82,40 @@ def publish_figures(out: Path, target: Path, preset: str = Size.preset) -> list[
       The files in `target`.
 
     Raises:
-      OSError: if something is missing.
+      ValueError: naming what is missing, or is of another run.
+      OSError: if results are missing.
     """
-    target.mkdir(parents=True, exist_ok=True)
+    figures = [figure.name for figure in FIGURES]
     folder = results_folder(out, Size(preset=preset))
     copies = [out / name for name in TABLES]
-    names = (*(figure.name for figure in FIGURES), front.NAME)
-    copies += [out / f"{name}{suffix}" for name in names for suffix in (".pdf", ".png", ".csv")]
-    written = [Path(shutil.copyfile(path, target / path.name)) for path in copies]
-    for name in (*(figure.name for figure in FIGURES), "source"):
-        written.append(_publish_manifest(folder / name / store.MANIFEST, target / f"{name}.manifest.json"))
-    n_seeds = json.loads((out / "claims.json").read_text(encoding="utf-8"))[0]["n_seeds"]
-    results = {figure.name: figure.results(folder, n_seeds) for figure in FIGURES}
-    numbers = target / "numbers.json"
-    write_text(numbers, json.dumps(numbers_of(results), indent=2, allow_nan=False) + "\n")
-    return [*written, numbers]
+    copies += [out / f"{name}{suffix}" for name in (*figures, front.NAME) for suffix in (".pdf", ".png", ".csv")]
+    manifests = {name: folder / name / store.MANIFEST for name in (*figures, "source")}
+    _require_files(out, [*copies, *manifests.values(), out / record.FILE])
+    seeds = record.seeds_in(out, record.record_of(Size(preset=preset), figures, Delta()))
+    for path in manifests.values():
+        _require_seeds(path, seeds)
+    results = {figure.name: figure.results(folder, seeds) for figure in FIGURES}
+    numbers = json.dumps(numbers_of(results, preset), indent=2, allow_nan=False) + "\n"
+    target.mkdir(parents=True, exist_ok=True)
+    return [
+        *(Path(shutil.copyfile(path, target / path.name)) for path in copies),
+        *(_publish_manifest(path, target / f"{name}.manifest.json") for name, path in manifests.items()),
+        write_text(target / "numbers.json", numbers),
+    ]
+
+
+def _require_files(out: Path, paths: list[Path]) -> None:
+    """Refuses a folder in which files are missing."""
+    missing = [str(path.relative_to(out)) for path in paths if not path.is_file()]
+    if missing:
+        refuse("folder", str(out), f"one to which `make figures` has written all figures: {', '.join(missing)}")
+
+
+def _require_seeds(manifest: Path, seeds: int) -> None:
+    """Refuses figures of other seeds than a manifest tells of."""
+    there = json.loads(manifest.read_text(encoding="utf-8"))["seeds"]
+    if there != list(range(seeds)):
+        refuse("seeds", seeds, f"figures of all that {manifest} tells of, {store.in_words(set(there))}")
 
 
 def _publish_manifest(path: Path, target: Path) -> Path:
@@ -100,12 +124,15 @@ def _publish_manifest(path: Path, target: Path) -> Path:
 
 
 def publish_study(summary: Path, target: Path) -> Path:
-    """Copies a study's summary."""
-    shutil.copytree(summary, target, dirs_exist_ok=True)
-    manifests = target / "manifests.json"
+    """Copies a study's summary in place of the one that is published, of which no file stays."""
+    fresh = target.with_name(f"{target.name}.new")
+    shutil.rmtree(fresh, ignore_errors=True)
+    shutil.copytree(summary, fresh)
+    manifests = fresh / "manifests.json"
     if manifests.is_file():
         _publish_manifest(manifests, manifests)
-    return target
+    shutil.rmtree(target, ignore_errors=True)
+    return fresh.rename(target)
 
 
 def publish_preset(file: Path, target: Path) -> Path:

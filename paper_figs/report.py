@@ -7,6 +7,7 @@ import json
 import re
 import shlex
 import struct
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from jrcjax.model.params import EnvParams
 from jrcjax.model.presets import ENVIRONMENTS, PRESETS
 from jrcjax.named import field_at, named_inputs
 from paper_figs.claims import words
+from paper_figs.claims.delta import Delta
 from paper_figs.claims.judge import Judgement
 from paper_figs.claims.results import Rules
 from sweeps.preset import environment_of, label_of, slots_of
@@ -51,6 +53,8 @@ def render(
     optima: list[dict],
     diverged: list[dict],
     manifests: dict[str, str],
+    only: tuple[int, ...] = (),
+    delta: Delta | None = None,
 ) -> str:
     """The page.
 
@@ -61,6 +65,8 @@ def render(
       optima: rows of `optimum_rows`.
       diverged: rows of `divergence.rows`.
       manifests: sweep name to its manifest's text.
+      only: numbers of the figures that were asked for, all if empty.
+      delta: what the verdicts count as negligible; the defaults if None.
     """
     figures = [_picture(title, path) for title, path in pictures.items()]
     parsed = {name: json.loads(text) for name, text in manifests.items()}
@@ -87,7 +93,7 @@ def render(
         optima=optima,
         slots=slots_of(size.preset),
         diverged=diverged,
-        command=_command(size),
+        command=_command(size, only, delta or Delta()),
         settings=_settings(parsed),
         made=_made(parsed),
         manifests=manifests,
@@ -118,11 +124,16 @@ def _figure_of(claim: Judgement, figures: list[dict[str, Any]]) -> str | None:
     return next((name for name in (f"fig{claim.figure}", f"fig{claim.figure}".rstrip("abc")) if name in names), None)
 
 
-def _command(size: Size) -> str:
+def _command(size: Size, only: tuple[int, ...], delta: Delta) -> str:
     """What makes the same figures and the same page."""
     preset = size.preset if size.preset in PRESETS else "FILE.toml"
     options = ["--seeds", str(size.seeds), "--episodes", str(size.episodes), "--preset", preset]
     smoke = [] if size.pretraining == Size.pretraining else ["--smoke"]
+    if only:
+        options += ["--only", *map(str, only)]
+    for name, value in asdict(delta).items():
+        if value != getattr(Delta(), name):
+            options += [f"--delta.{name.replace('_', '-')}", str(value)]
     return f"make figures ARGS={shlex.quote(shlex.join([*smoke, *options]))}"
 
 

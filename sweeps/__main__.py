@@ -100,7 +100,8 @@ def main(args: list[str] | None = None) -> int:
     try:
         return _run(command)
     except KeyboardInterrupt:
-        print(interrupts.how_to_go_on("--resume"), file=sys.stderr)
+        flags = ("--resume",) if isinstance(command, Run) else ()
+        print(interrupts.how_to_go_on(*flags), file=sys.stderr)
         return interrupts.STATUS
     except (ValueError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
@@ -130,6 +131,8 @@ def _run(command: Command) -> int:
     size.check()
     sweeps = study.smoke_sweeps if command.smoke and study.smoke_sweeps else study.sweeps
     require_integer("wait", command.wait, 0)
+    if command.wait != Run.wait and not _has_cluster(command):
+        refuse("wait", command.wait, "a number of seconds beside --scheduler or --workers, for which alone it is")
     options = {"resume": command.resume, "save_agents": command.save_agents, "patience": command.wait}
     with interrupts.terminable(), _client(command) as client:
         run = functools.partial(run_sweep, size=size, out=command.out, console=console, **options, client=client)
@@ -175,15 +178,20 @@ def _study(command: Run, preset: str) -> Study:
 
 
 def _multiverse(command: Run) -> Study:
-    """The readings asked for: all, or with --keep those that the summary does not have, or is undecided about."""
+    """The readings asked for: all, or with --keep those that the summary does not have, or is undecided about.
+
+    Without --keep a summary that is there is replaced, so it may not tell of more than this run does.
+    """
     from sweeps.studies import multiverse
 
     which, selection = (command.readings, command.smoke, command.first), multiverse.Selection(command.per_block)
+    size = size_of(command.seeds, command.episodes, "paper", command.smoke, multiverse.MULTIVERSE)
     if not command.keep:
         if command.undecided is not None:
             refuse("keep", False, "True beside --undecided, which adds seeds to what a summary says of other readings")
-        return multiverse.study_of(*which, selection)
-    size = size_of(command.seeds, command.episodes, "paper", command.smoke, multiverse.MULTIVERSE)
+        study = multiverse.study_of(*which, selection)
+        multiverse.require_nothing_lost(command.out, study.sweeps, size)
+        return study
     if command.undecided is None:
         multiverse.require_summary(command.out, size)
         finished = _found(_FINISHED)(command.out, size.seeds)
@@ -197,9 +205,14 @@ def _multiverse(command: Run) -> Study:
     return study
 
 
+def _has_cluster(command: Run) -> bool:
+    """Whether a cluster's workers compute."""
+    return command.scheduler is not None or command.workers is not None
+
+
 def _client(command: Run) -> contextlib.AbstractContextManager:
     """The client of the cluster that the command asks for, None if it asks for none."""
-    if command.scheduler is None and command.workers is None:
+    if not _has_cluster(command):
         return contextlib.nullcontext()
     from sweeps.engine.distributed import client_of
 
@@ -214,9 +227,9 @@ def _verify(command: Verify) -> int:
     differ = 0
     for part, differences in verify.verify(command.folder, command.parts, EVERY_SWEEP):
         differ += bool(differences)
-        print(f"{part.path}: {'differs' if differences else 'the same, bit for bit'}")
+        print(f"{part.path}: {'differs' if differences else 'the same, bit for bit'}", flush=True)
         for line in differences and [*differences, *verify.made_elsewhere(part)]:
-            print(f"  {line}")
+            print(f"  {line}", flush=True)
     return min(differ, 1)
 
 

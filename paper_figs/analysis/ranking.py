@@ -19,7 +19,9 @@ _STUDIES = 10_000  # drawn per size
 def misranking(scores: np.ndarray, n: int, seed: int = 0) -> float:
     """Probability that the means of n seeds order the learners differently than those of all seeds.
 
-    Studies are drawn from the seeds without replacement, and all learners of a study have the same seeds.
+    Studies are drawn from the seeds without replacement, and all learners of a study have the same seeds. Learners that
+    tie in a study have any order there, each as likely: two that differ in the whole are wrong in one half of it.
+    Learners that tie in the whole, such as those that never converge, have no order that could be wrong.
 
     Args:
       scores: [learners, seeds], n at most the number of seeds.
@@ -27,10 +29,16 @@ def misranking(scores: np.ndarray, n: int, seed: int = 0) -> float:
       seed: of the generator.
     """
     generator = np.random.default_rng(seed)
-    wanted = np.argsort(scores.mean(axis=1))
     drawn = generator.random((_STUDIES, scores.shape[1])).argpartition(n - 1, axis=1)[:, :n]
-    orders = np.argsort(scores[:, drawn].mean(axis=2), axis=0)
-    return float((orders != wanted[:, None]).any(axis=0).mean())
+    whole, studies = scores.mean(axis=1), scores[:, drawn].mean(axis=2)
+    listings = map(list, itertools.permutations(range(len(scores))))
+    return float(np.mean([_wrong_share(studies[listing], whole[listing]) for listing in listings]))
+
+
+def _wrong_share(studies: np.ndarray, whole: np.ndarray) -> float:
+    """Share of studies, [learners, studies], that order learners differently than the whole; ties go by the listing."""
+    in_order = whole[np.argsort(studies, axis=0, kind="stable")]
+    return float((np.diff(in_order, axis=0) < 0).any(axis=0).mean())
 
 
 def seeds_needed(differences: np.ndarray) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -27,5 +28,11 @@ def mean_over_seeds(values: np.ndarray) -> Mean:
 
 
 def bins_of(episodes: int, points: int = 100) -> int:
-    """Episodes per plotted point of a learning curve: the smallest divisor of `episodes` giving at most `points`."""
-    return next(width for width in range(1, episodes + 1) if episodes % width == 0 and episodes // width <= points)
+    """Episodes per plotted point of a learning curve, the fewest that give at most so many points."""
+    return math.ceil(episodes / points)
+
+
+def bin_means(values: np.ndarray, width: int) -> np.ndarray:
+    """Means of [..., episodes] over so many episodes each, [..., bins]; the last bin may have fewer."""
+    bins = np.split(values, range(width, values.shape[-1], width), axis=-1)
+    return np.stack([of_bin.mean(axis=-1) for of_bin in bins], axis=-1)

@@ -190,7 +190,11 @@ def _number(value: Any) -> Any:
 
 
 def from_json(rows: list[dict]) -> list[Judgement]:
-    """The judgements that `as_json` wrote. Where one limit is a number, what is null beside it is infinite."""
+    """The judgements that `as_json` wrote.
+
+    A limit that is null beside one that is a number is infinite, and so is a value that is null with its upper limit;
+    a value that is null between two numbers is none.
+    """
     return [Judgement(**row | _finite_or_not(row)) for row in rows]
 
 
@@ -199,7 +203,7 @@ def _finite_or_not(row: dict) -> dict[str, Any]:
     bounded = low is not None or high is not None
     limit = row["limit"]
     return {
-        "value": _restored(row["value"], math.inf if bounded else math.nan),
+        "value": _restored(row["value"], math.inf if bounded and high is None else math.nan),
         "ci_low": _restored(low, -math.inf if bounded else math.nan),
         "ci_high": _restored(high, math.inf if bounded else math.nan),
         "limit": tuple(limit) if isinstance(limit, list) else limit,

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from paper_figs.analysis import divergence
-from paper_figs.analysis.statistics import bins_of, mean_over_seeds
+from paper_figs.analysis.statistics import bin_means, bins_of, mean_over_seeds
 from paper_figs.plots import style
 
 _INSET = (0.3, 0.26, 0.66, 0.42)  # left, bottom, width and height, as shares of the axes
@@ -19,8 +19,9 @@ COLUMNS = ["figure", "panel", "algorithm", "x", "mean", "ci_low", "ci_high", "n_
 def table(data: xr.Dataset, figure: str, panel: str, points: dict[str, int] | None = None) -> pd.DataFrame:
     """The plotted numbers: mean reward per slot in bins of consecutive episodes, over seeds; and three exact lines.
 
-    `x` is the last episode of a bin. The interval is at 95 % over seeds (`mean_effect`). The exact lines have no seeds
-    (n_seeds 0) and their interval is themselves. `n_diverged` of the seeds' agents diverged at some time.
+    `x` is the last episode of a bin; the last bin may have fewer than the others. The interval is at 95 % over seeds
+    (`mean_effect`). The exact lines have no seeds (n_seeds 0) and their interval is themselves. `n_diverged` of the
+    seeds' agents diverged at some time.
 
     Args:
       data: results of a sweep.
@@ -30,7 +31,7 @@ def table(data: xr.Dataset, figure: str, panel: str, points: dict[str, int] | No
     """
     episodes = data.sizes["episode"]
     width = bins_of(episodes)
-    x = np.arange(width, episodes + 1, width)
+    x = [*range(width, episodes, width), episodes]
     rows = []
     curves = {name: (name, 0) for name in data["algorithm"].values}
     if points is not None:
@@ -38,7 +39,7 @@ def table(data: xr.Dataset, figure: str, panel: str, points: dict[str, int] | No
     for name, (algorithm, point) in curves.items():
         reward = data["reward"].sel(algorithm=algorithm).isel(point=point).transpose("seed", "episode").values
         n_diverged = divergence.count(data, algorithm, point)
-        mean = mean_over_seeds(reward.reshape(reward.shape[0], -1, width).mean(axis=2))
+        mean = mean_over_seeds(bin_means(reward, width))
         rows += [
             (figure, panel, name, int(e), m, low, high, mean.n_seeds, n_diverged)
             for e, m, low, high in zip(x, mean.mean, mean.low, mean.high, strict=True)
@@ -46,10 +47,7 @@ def table(data: xr.Dataset, figure: str, panel: str, points: dict[str, int] | No
     for name in style.EXACT:
         reward = data[f"{name}_reward"].isel(point=0)
         reward = reward.values if "episode" in reward.dims else np.full(episodes, float(reward))
-        rows += [
-            (figure, panel, name, int(e), r, r, r, 0, 0)
-            for e, r in zip(x, reward.reshape(-1, width).mean(axis=1), strict=True)
-        ]
+        rows += [(figure, panel, name, int(e), r, r, r, 0, 0) for e, r in zip(x, bin_means(reward, width), strict=True)]
     return pd.DataFrame(rows, columns=COLUMNS)
 
 

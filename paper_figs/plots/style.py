@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import functools
 import io
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple, ParamSpec
 
 import matplotlib as mpl
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
 
 from jrcjax.files import write_text, write_whole
@@ -101,16 +100,6 @@ def save(figure: Figure, path: Path) -> list[Path]:
             write_whole(target, picture.getvalue())
             written.append(target)
     return written
-
-
-def save_pages(figures: Iterable[Figure], path: Path) -> Path:
-    """Writes one PDF with a page for each figure; the same figures give the same bytes."""
-    content = io.BytesIO()
-    with mpl.rc_context(fname=STYLE), PdfPages(content, metadata={"CreationDate": None, "Producer": None}) as pages:
-        for figure in figures:
-            pages.savefig(figure)
-    write_whole(path, content.getvalue())
-    return path
 
 
 def save_table(table: pd.DataFrame, path: Path) -> Path:

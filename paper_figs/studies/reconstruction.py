@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from jrcjax.checks import refuse
 from jrcjax.files import write_text
 from paper_figs.claims.judge import shortfall
 from paper_figs.claims.table import CLAIMS, number_of
@@ -76,7 +77,11 @@ def search(effort: Effort, size: Size, out: Path, run: Callable[..., Path]) -> l
 
     Returns:
       The files in OUT/reconstruction/summary.
+
+    Raises:
+      ValueError: naming `readings`, if a longer search has left its summary there.
     """
+    _require_as_many(effort, out / NAME / "summary")
     known = _of_multiverse(out)
     optimisers = [_Optimiser(unit, effort.per_generation, seed) for seed, unit in enumerate(_starts(known, effort))]
     found: list[Tried] = []
@@ -100,6 +105,16 @@ def search(effort: Effort, size: Size, out: Path, run: Callable[..., Path]) -> l
         tables["confirmed"] = confirmed_table(chosen[: len(confirmed)], confirmed)
         written = _write(out / NAME / "summary", tables, chosen[0].reading)
     return written
+
+
+def _require_as_many(effort: Effort, summary: Path) -> None:
+    """Refuses a search that would replace the summary of a longer one, such as a tiny one."""
+    path = summary / "tried.csv"
+    if not path.is_file():
+        return
+    there = int(pd.read_csv(path).reading.str.startswith("search ").sum())
+    if -(-effort.readings // effort.per_generation) * effort.per_generation < there:  # whole generations are tried
+        refuse("readings", effort.readings, f"at least {there}, as in the summary in {summary}; or another --out")
 
 
 class Choice(NamedTuple):

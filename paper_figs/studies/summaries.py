@@ -17,6 +17,9 @@ from sweeps.studies.multiverse import verdicts_file
 from sweeps.studies.robustness import SOURCE, TARGET
 from sweeps.sweep import Size, Sweep
 
+_OF_MANY = ("sensitivity", "interactions", "known", "specification")
+"""Names of a multiverse's files that need more readings than some runs have."""
+
 
 def _write(folder: Path, tables: dict[str, pd.DataFrame]) -> list[Path]:
     return [style.save_table(table, folder / f"{name}.csv") for name, table in tables.items()]
@@ -67,7 +70,16 @@ def summarise_multiverse(sweeps: tuple[Sweep, ...], size: Size, out: Path, keep:
     if "sensitivity" in tables:
         pictures += style.save(readings.draw_decisive(tables["sensitivity"]), folder / "sensitivity")
         pictures += style.save(multiverse.specification(found, tables["sensitivity"]), folder / "specification")
-    return [path, *_write(folder, tables), *pictures, _manifests(folder, sweeps, out, keep)]
+    written = [path, *_write(folder, tables), *pictures]
+    _remove_others(folder, written)
+    return [*written, _manifests(folder, sweeps, out, keep)]
+
+
+def _remove_others(folder: Path, written: list[Path]) -> None:
+    """Removes what an earlier run of more readings left, which would say something else than the verdicts beside it."""
+    for path in (folder / f"{name}{suffix}" for name in _OF_MANY for suffix in (".csv", ".pdf", ".png")):
+        if path not in written:
+            path.unlink(missing_ok=True)
 
 
 def _of_block(sweep: Sweep, size: Size, out: Path) -> pd.DataFrame:

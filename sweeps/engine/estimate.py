@@ -7,7 +7,7 @@ from jrcjax.training import parallel
 from sweeps.engine import pace
 from sweeps.engine.job import Group, Job
 
-# Core time of one agent in one slot, microseconds, on the machine of the README's table of speeds.
+# Core time of one agent in one slot, microseconds, on the machine of the table in docs/explanation/performance.md.
 _CORE_US = {"tlwd": 6.5, "dpr": 2.8, "ddqn": 2.8, "q_learning": 0.4, "round_robin": 0.2}
 
 

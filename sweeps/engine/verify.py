@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -101,8 +101,8 @@ def _difference(name: str, a: xr.DataArray, b: xr.DataArray, differs: np.ndarray
     return Difference(name, int(differs.sum()), differs.size, coords, float(gap))
 
 
-def verify(folder: Path, number: int | None, sweeps: Mapping[str, Sweep]) -> list[tuple[Part, list[Difference]]]:
-    """Recomputes some parts of a folder, all if `number` is None, and says what differs in each.
+def verify(folder: Path, number: int | None, sweeps: Mapping[str, Sweep]) -> Iterator[tuple[Part, list[Difference]]]:
+    """Recomputes some parts of a folder, all if `number` is None, and says of each what differs before the next one.
 
     Args:
       folder: with the parts of one sweep.
@@ -114,11 +114,9 @@ def verify(folder: Path, number: int | None, sweeps: Mapping[str, Sweep]) -> lis
     """
     if not folder.is_dir() or not (parts := parts_of(folder)):
         refuse("folder", str(folder), "a folder with the parts of a sweep, such as out/results/fig6")
-    results = []
     for part in sample_of(parts, number):
         sweep = _sweep_of(part, sweeps)
-        results.append((part, differences(read_part(part.path), recomputed(part, sweep))))
-    return results
+        yield part, differences(read_part(part.path), recomputed(part, sweep))
 
 
 def _sweep_of(part: Part, sweeps: Mapping[str, Sweep]) -> Sweep:

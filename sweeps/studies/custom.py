@@ -112,6 +112,8 @@ def _environment(base: str) -> str:
 
 def _design(options: Options, base: Points) -> Design:
     """The points: those of a table, a sample, or a grid."""
+    if options.sample is None and options.sample_seed != Options.sample_seed:
+        refuse("seed", options.sample_seed, "a seed beside --sample, for which alone it is; of runs it is --seeds")
     if options.table is not None:
         if options.vary or options.sample is not None:
             refuse("table", str(options.table), "a table alone, without --vary and --sample")
@@ -145,7 +147,7 @@ def _checked(points: Design, base: Points) -> Design:
 
 def _table(path: Path, base: Points) -> Design:
     with path.open(encoding="utf-8-sig", newline="") as file:
-        rows = [row for row in csv.reader(file) if any(cell.strip() for cell in row)]
+        rows = [row for row in csv.reader(file) if row]  # without blank lines; empty cells are a point like the base
     if len(rows) < 2 or any(len(row) != len(rows[0]) for row in rows):
         refuse("table", str(path), "a line of paths and a line of as many values for each point")
     if len(rows) - 1 > _MOST_POINTS:
@@ -182,6 +184,8 @@ def _split(option: str, text: str, allowed: str) -> tuple[str, str]:
 def _with_source(sweep: Sweep, base: Points, preset: str, setting: str) -> Sweep:
     """The sweep with what trains its source agents, if learners need them: in the paper's source environment."""
     needing = [name for name in sweep.learners if learner_for(name, base.params, Config()).needs_source]
+    if not needing and setting != SOURCES[0]:
+        refuse("source", setting, f"{SOURCES[0]} with learners that have no source agents, {', '.join(sweep.learners)}")
     if not needing:
         return sweep
     if spec_of(base_of("source", preset).points.params)[:2] != spec_of(base.params)[:2]:

@@ -6,6 +6,7 @@ added, resumed, or sent to other machines.
 
 from __future__ import annotations
 
+import csv
 import hashlib
 import itertools
 import json
@@ -214,7 +215,27 @@ def require_summary(out: Path, size: Size) -> None:
     path = verdicts_file(out)
     if not path.is_file():
         refuse("keep", True, f"where an earlier run left its summary, and {path} is missing")
-    manifests = json.loads((path.parent / "manifests.json").read_text(encoding="utf-8"))
-    kept = {manifest["configuration"]["episodes"] for manifest in manifests.values()}
+    kept = _lengths(path.parent)
     if kept - {size.episodes}:
         refuse("episodes", size.episodes, f"{', '.join(map(str, sorted(kept)))}, as in the summary that is kept")
+
+
+def require_nothing_lost(out: Path, sweeps: Sequence[Sweep], size: Size) -> None:
+    """Raises ValueError naming `keep` if the summary in `out` tells of runs that these sweeps do not make again."""
+    path = verdicts_file(out)
+    if not path.is_file():
+        return
+    with path.open(encoding="utf-8", newline="") as file:
+        there = {(int(row["reading"]), int(row["n_seeds"])) for row in csv.DictReader(file)}
+    made = {(int(n), size.seeds) for sweep in sweeps if sweep.source for n in sweep.source.design.values("reading")}
+    lost = there - made if _lengths(path.parent) == {size.episodes} else there
+    if lost:
+        readings = len({reading for reading, _ in lost})
+        what = f"what the summary in {path.parent} says of {readings} readings, which this run does not make"
+        refuse("keep", False, f"True, which keeps {what} with as many seeds and episodes; or another --out")
+
+
+def _lengths(summary: Path) -> set[int]:
+    """The numbers of episodes of the runs that a summary rests on."""
+    manifests = json.loads((summary / "manifests.json").read_text(encoding="utf-8"))
+    return {manifest["configuration"]["episodes"] for manifest in manifests.values()}

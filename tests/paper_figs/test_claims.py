@@ -4,6 +4,7 @@ import dataclasses
 import functools
 import itertools
 import json
+import math
 
 import numpy as np
 import pytest
@@ -301,6 +302,17 @@ def test_judgements_survive_json_and_never_is_no_number():
     never = next(j for j in found if j.claim == "C1 (about 200)" and j.n_seeds == 10)
     assert words.measured(never) == "never (1000 to never)"
     assert words.criterion(never).endswith("converge between 100 and 300")
+
+
+def test_what_is_not_known_of_any_pair_is_no_number_after_json():
+    learners = {"tlwd": Learner(100, 0.5), "dpr": Learner(NEVER, 0.5), "ddqn": Learner(NEVER, 0.5)}
+    found = {j.claim: j for j in claims_of_figure("fig5b", study(learners, 5.0, episodes=450))}
+    before = found["C3 (DPR)"]
+    assert math.isnan(before.value)
+    assert (before.ci_low, before.ci_high) == (0.0, 1.0)
+    (after,) = judge.from_json(json.loads(json.dumps(judge.as_json([before]), allow_nan=False)))
+    np.testing.assert_equal(dataclasses.asdict(after), dataclasses.asdict(before))
+    assert words.measured(after) == "–"
 
 
 def test_no_effect_depends_on_the_order_of_learners_points_or_seeds():

@@ -13,12 +13,13 @@ from matplotlib.colors import to_rgb
 from matplotlib.text import Text
 from worlds import Learner
 
-from paper_figs import NUMBERS, report
+from paper_figs import NUMBERS, pipeline, report
 from paper_figs.__main__ import main
 from paper_figs.analysis import divergence, statistics
 from paper_figs.analysis.intervals import mean_effect
 from paper_figs.figures import FIGURES
 from paper_figs.plots import curves, points, style
+from sweeps.results import store
 from sweeps.sweep import Size
 
 SLOTS = 300
@@ -38,9 +39,22 @@ def speed_world():
     return worlds.as_the_paper_says(seeds=6, episodes=40)["fig6"]
 
 
-@pytest.mark.parametrize(("episodes", "width"), [(1000, 10), (20, 1), (100, 1), (150, 2), (101, 101)])
-def test_bins_divide_the_episodes_and_give_at_most_a_hundred_points(episodes, width):
+@pytest.mark.parametrize(("episodes", "width"), [(1000, 10), (20, 1), (100, 1), (150, 2), (101, 2), (997, 10)])
+def test_bins_are_the_smallest_that_give_at_most_a_hundred_points(episodes, width):
     assert statistics.bins_of(episodes) == width
+    values = np.random.default_rng(0).normal(size=(3, episodes)).astype(np.float32)
+    means = statistics.bin_means(values, width)
+    assert means.shape == (3, -(-episodes // width))
+    whole = episodes // width
+    # Bit for bit, whether or not there are more episodes than whole bins have.
+    np.testing.assert_array_equal(means[:, :whole], values[:, : whole * width].reshape(3, -1, width).mean(axis=2))
+    if rest := episodes % width:
+        np.testing.assert_allclose(means[:, -1], values[:, -rest:].mean(axis=1), rtol=1e-6)
+
+
+def test_a_prime_number_of_episodes_is_drawn_as_a_curve():
+    table = curves.table(results(episodes=997), "5", "a")
+    assert set(table.groupby("algorithm").x.agg(tuple)) == {(*range(10, 991, 10), 997)}
 
 
 def test_table_holds_bin_means_over_seeds_and_the_exact_optimum():
@@ -111,6 +125,9 @@ def test_one_command_writes_everything(tmp_path, capsys):
     assert {"figure", "panel", "algorithm", "x", "mean", "ci_low", "ci_high", "n_seeds"} <= set(table.columns)
     assert set(table.n_seeds) == {0, 3}
     assert {row["claim"] for row in json.loads((out / "claims.json").read_text())} > {"C1 (reached)"}
+    made = json.loads((out / "made.json").read_text())
+    assert (made["preset"], made["episodes"], made["seeds"]) == ("paper", 20, 3)
+    assert made["figures"] == ["fig5a", "fig5b"]
     page = (out / "report.html").read_text()
     assert "data:image/png;base64," in page
     assert "http" not in page.replace(
@@ -169,6 +186,25 @@ def test_drawn_points_are_the_table():
         for name, look in style.EXACT.items() | {n: style.LOOKS[n] for n in ("tlwd", "dpr", "ddqn")}.items():
             wanted = table.query(f"panel == {panel!r} and algorithm == {name!r}")
             np.testing.assert_allclose(lines[look.label].get_ydata(), wanted["mean"])
+
+
+def test_claims_are_judged_from_all_learners_that_were_run_and_pictures_show_their_own(tmp_path, monkeypatch):
+    never = dict.fromkeys(("tlwd", "dpr", "ddqn", "round_robin"), Learner(worlds.NEVER, 0.5))
+    learners = never | {"q_learning": Learner(50, 0.5)}  # converges, and is in neither picture
+    axes = {"fig6": ("high_speed_event_probability", worlds.TENTHS), "fig9": ("prioritised", (1.0, 0.0))}
+    judged = {}
+    for figure in (figure for figure in FIGURES if figure.name in axes):
+        data = worlds.study(learners, 4.0, *axes[figure.name], seeds=6)
+        monkeypatch.setattr(store, "load", lambda folder, seeds, data=data: data)
+        (tmp_path / figure.name).mkdir()
+        (tmp_path / figure.name / store.MANIFEST).write_text("{}")
+        drawn = pipeline._draw(figure, tmp_path, Size(seeds=6), tmp_path)
+        judged |= {j.claim: j for j in pipeline.judgements_of({figure.name: drawn.results})}
+        expected = {"tlwd", "tlwd_uniform"} if figure.name == "fig9" else {"tlwd", "dpr", "ddqn"}
+        assert set(pd.read_csv(tmp_path / f"{figure.name}.csv").algorithm) == expected | set(style.EXACT)
+    # As in a study of many readings: somebody converges, so that the others never do is known.
+    assert judged["C7 (DDQN)"].verdict == "contradicted"
+    assert judged["C15 (episodes)"].reason == "the interval of 6 seeds holds the limit"
 
 
 def test_one_algorithm_at_two_points_gives_two_curves():

@@ -7,10 +7,16 @@ import numpy as np
 import pytest
 import worlds
 
-from paper_figs import pipeline, publish, readme
+import jrcjax
+from jrcjax import exact
+from paper_figs import pipeline, publish, readme, record
+from paper_figs.claims.delta import Delta
 from paper_figs.claims.judge import as_json
 from paper_figs.claims.table import CLAIMS, claims_of
+from paper_figs.figures import FIGURES
 from paper_figs.numbers import numbers_of
+from sweeps.results import store
+from sweeps.sweep import Size
 
 PUBLISHED = publish.ROOT / "published"
 QUOTING = [path for path in publish.texts(publish.ROOT) if "made by python -m paper_figs.publish" in path.read_text()]
@@ -57,6 +63,72 @@ def test_missing_results_are_an_error_that_names_them(tmp_path, capsys):
     assert "claims.json" in capsys.readouterr().err
 
 
+@pytest.fixture
+def drawn(tmp_path, monkeypatch):
+    """A folder as `make figures` leaves it, with published files; its results are a made-up world's."""
+    out = tmp_path / "out"
+    shutil.copytree(PUBLISHED / "figures", out)
+    for path in out.glob("*.manifest.json"):
+        folder = pipeline.results_folder(out, Size()) / path.name.removesuffix(".manifest.json")
+        folder.mkdir(parents=True)
+        path.rename(folder / store.MANIFEST)
+    world = worlds.as_the_paper_says(seeds=5, episodes=450)
+    monkeypatch.setattr(store, "load", lambda folder, seeds: world[folder.name])
+    figures = [figure.name for figure in FIGURES]
+    record.write(out, record.record_of(Size(seeds=10), figures, Delta()))
+    return out
+
+
+def test_figures_are_published_with_the_manifests_of_their_run(drawn, tmp_path):
+    written = publish.publish_figures(drawn, tmp_path / "figures")
+    assert {path.name for path in written} == {path.name for path in (PUBLISHED / "figures").iterdir()}
+    for path in written:
+        assert path.name == "numbers.json" or path.read_bytes() == (PUBLISHED / "figures" / path.name).read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("size", "figures", "delta", "message"),
+    [
+        (Size(preset="paper_table"), FIGURES, Delta(), r"made.json: preset: 'paper_table'; allowed: paper"),
+        (Size(episodes=450), FIGURES, Delta(), r"made.json: episodes: '450'; allowed: 1000"),
+        (
+            Size(seeds=9),
+            FIGURES,
+            Delta(),
+            r"seeds: 9; allowed: figures of all that .*fig5a.* tells of, 0 to 9",
+        ),
+        (Size(), FIGURES[:2], Delta(), r"made.json: figures: .*; allowed: \['fig5a', 'fig5b', 'fig6'"),
+        (Size(), FIGURES, Delta(reward=0.02), r"made.json: delta: .*; allowed: {'reward': 0.01"),
+    ],
+)
+def test_figures_of_another_run_than_the_manifests_are_not_published(drawn, tmp_path, size, figures, delta, message):
+    record.write(drawn, record.record_of(size, [figure.name for figure in figures], delta))
+    with pytest.raises(ValueError, match=message):
+        publish.publish_figures(drawn, tmp_path / "figures")
+    assert not (tmp_path / "figures").exists()
+
+
+@pytest.mark.parametrize("name", ["fig9.png", record.FILE, "results/paper-1000-episodes/source/manifest.json"])
+def test_with_a_file_missing_nothing_is_published(drawn, tmp_path, name):
+    (drawn / name).unlink()
+    with pytest.raises(ValueError, match=f"folder: '{drawn}'; allowed: one to which .* all figures: {name}$"):
+        publish.publish_figures(drawn, tmp_path / "figures")
+    assert not (tmp_path / "figures").exists()
+
+
+def test_a_summary_is_published_whole_and_without_files_of_the_one_before(tmp_path):
+    summary, target = tmp_path / "summary", tmp_path / "published" / "multiverse"
+    for folder, name in ((summary / "tried", "new.csv"), (target, "known.csv")):
+        folder.mkdir(parents=True)
+        (folder / name).write_text("x")
+    with pytest.raises(OSError, match="nowhere"):
+        publish.publish_study(tmp_path / "nowhere", target)
+    assert (target / "known.csv").is_file()
+    assert publish.publish_study(summary, target) == target
+    assert [path.relative_to(target).as_posix() for path in target.rglob("*.*")] == ["tried/new.csv"]
+    assert [path.name for path in target.parent.iterdir()] == ["multiverse"]
+
+
 def test_quoted_numbers_are_those_of_the_results():
     data = worlds.as_the_paper_says(seeds=5, episodes=450)
     numbers = numbers_of(data)
@@ -65,6 +137,16 @@ def test_quoted_numbers_are_those_of_the_results():
     np.testing.assert_allclose(numbers["fig5b"]["first_gap_dpr"], 0.5, atol=1e-3)
     assert numbers["fig5a"]["c1_at_0.05"] == "supported"
     json.dumps(numbers, allow_nan=False)
+
+
+def test_quoted_numbers_of_a_preset_are_those_of_its_environment():
+    data = {"fig5a": worlds.as_the_paper_says(seeds=5, episodes=450)["fig5a"]}
+    numbers = {preset: numbers_of(data, preset)["fig5a"] for preset in ("paper", "paper_table")}
+    for preset, found in numbers.items():
+        params = jrcjax.paper_params("source", preset)
+        best = exact.optimal_policy(params)
+        assert found["states_that_transmit"] == float(best[:, : params.num_rates].sum())
+    assert numbers["paper"]["mean_value"] != numbers["paper_table"]["mean_value"]
 
 
 def test_figures_that_were_not_made_have_no_verdicts_in_the_file():

@@ -129,6 +129,22 @@ def test_a_search_goes_on_from_the_verdicts_that_it_kept(small_steps_only, tmp_p
     ]
 
 
+def test_a_summary_is_not_replaced_by_that_of_a_shorter_search(small_steps_only, tmp_path):
+    def search(readings):
+        ran = []
+        effort = Effort(readings=readings, confirm=1, starts=1, per_generation=4)
+        reconstruction.search(effort, SIZE, tmp_path, lambda sweep, size=SIZE: ran.append(sweep.name))
+        return ran
+
+    search(10)
+    summary = tmp_path / "reconstruction" / "summary"
+    before = {path: path.read_bytes() for path in summary.rglob("*.*")}
+    with pytest.raises(ValueError, match=f"readings: 8; allowed: at least 12, as in the summary in {summary}; or ano"):
+        search(8)
+    assert {path: path.read_bytes() for path in summary.rglob("*.*")} == before
+    assert search(9) == []  # as many generations
+
+
 def test_a_search_that_is_stopped_says_what_is_confirmed_so_far(small_steps_only, tmp_path, monkeypatch):
     def two_of(tried, lost):
         return [reconstruction.Choice(tried[0], (reconstruction.ALL,)), reconstruction.Choice(tried[1], ("C5",))]

@@ -12,13 +12,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tyro
 import worlds
 import xarray as xr
 from browser import CHROMIUM, Browser
 
 from paper_figs import pipeline, report
+from paper_figs.__main__ import Options
+from paper_figs.claims.delta import Delta
 from paper_figs.figures import FIGURES
-from sweeps.sweep import SMOKE, Size
+from sweeps.options import FLAGS
+from sweeps.sweep import SMOKE, Size, size_of
 
 REFERENCE = Path(report.__file__).parents[1] / "published" / "figures"
 VOID = {"img", "meta", "link", "br", "hr", "input"}
@@ -154,14 +158,24 @@ def test_settings_and_origin_are_there(page, parsed):
 
 
 @pytest.mark.parametrize(
-    ("size", "command"),
+    ("size", "only", "delta", "command"),
     [
-        (Size(), "make figures ARGS='--seeds 10 --episodes 1000 --preset paper'"),
-        (SMOKE, "make figures ARGS='--smoke --seeds 2 --episodes 20 --preset paper'"),
+        (Size(), (), Delta(), "--seeds 10 --episodes 1000 --preset paper"),
+        (SMOKE, (), Delta(), "--smoke --seeds 2 --episodes 20 --preset paper"),
+        (
+            Size(),
+            (5, 9),
+            Delta(reward=0.02, miss_detection=0.05),
+            "--seeds 10 --episodes 1000 --preset paper --only 5 9 --delta.reward 0.02 --delta.miss-detection 0.05",
+        ),
     ],
 )
-def test_the_command_makes_the_page_anew(size, command):
-    assert report._command(size) == command
+def test_the_command_makes_the_page_anew(size, only, delta, command):
+    page = report.render(size, {}, [], [], [], {}, only, delta)
+    assert f"<pre>make figures ARGS=&#39;{command}&#39;</pre>" in page
+    options = tyro.cli(Options, args=command.split(), config=FLAGS)
+    assert (options.only, options.delta) == (only, delta)
+    assert size_of(options.seeds, options.episodes, options.preset, options.smoke) == size
 
 
 @pytest.mark.slow

@@ -116,6 +116,10 @@ def test_a_table_gives_any_points_and_its_empty_cells_are_the_base(tmp_path):
     points = points_of(sweep)
     np.testing.assert_array_equal(points.params.event_model, [1, 0, 2])
     np.testing.assert_array_equal(points.hparams.margin, [2.0, 0.5, 1.0])
+    file.write_text("env.event_model,hparams.margin\nmarginal,2\n,\n\nnoisy_or,0.5\n")
+    points = points_of(custom_sweep(Options(table=file), "paper"))
+    np.testing.assert_array_equal(points.params.event_model, [1, 0, 2])  # the line of empty cells is the base
+    np.testing.assert_array_equal(points.hparams.margin, [2.0, 1.0, 0.5])
     for text, message in (
         ("env.event_model\n", "allowed: a line of paths"),
         ("env.event_model,hparams.margin\nmarginal\n", "allowed: a line of paths"),
@@ -265,6 +269,15 @@ def test_values_that_mean_nothing_are_refused(path, text, message, point):
         (["--vary", "hparams.margin=1:0", "--sample", "8"], "hparams.margin: '1:0'; allowed: low < high"),
         (["--vary", "hparams.margin=0:1", "--sample", "1"], "sample: 1; allowed: an int from 2 to 100000"),
         (["--vary", "env.radar.density=5,9", "--source", "x"], "source: 'x' is unknown; allowed: 'same', 'table1'"),
+        (
+            ["--vary", "env.radar.density=5,9", "--source", "table1"],
+            "source: 'table1'; allowed: same with learners",
+        ),
+        (["--vary", "env.radar.density=5,9", "--seed", "30"], "seed: 30; allowed: a seed beside --sample"),
+        (
+            ["--vary", "env.radar.density=5,9", "--wait", "9"],
+            "wait: 9; allowed: a number of seconds beside --",
+        ),
         (["--vary", "env.radar.density=5,9", "--set", "foo"], "set: 'foo'; allowed: PATH=VALUE"),
         (["--vary", "env.radar.density=5,9", "--learners", "sarsa"], "learners: 'sarsa' is unknown; allowed:"),
         (["--vary", "env.radar.density=5,9", "--learners", "ddqn", "ddqn"], "allowed: one or more different learners"),

@@ -18,7 +18,7 @@ from sweeps.__main__ import main
 from sweeps.engine.job import Job
 from sweeps.preset import base_of
 from sweeps.results import store
-from sweeps.studies.multiverse import POINTS, Selection, some_of, sweeps_of
+from sweeps.studies.multiverse import POINTS, SIZE, Selection, require_nothing_lost, some_of, sweeps_of
 from sweeps.studies.readings import (
     PER_BLOCK,
     READINGS,
@@ -322,6 +322,38 @@ def test_readings_of_another_length_are_not_added(made_up, tmp_path, capsys):
     run = ["run", "multiverse", "--keep", "--readings", "2", "--episodes", "20", "--out", str(tmp_path / "out")]
     assert main(run) == 2
     assert "episodes: 20; allowed: 450, as in the summary that is kept" in capsys.readouterr().err
+
+
+def test_a_summary_that_says_more_than_a_run_is_not_replaced(made_up, tmp_path, capsys):
+    made_up("out", 2 * PER_BLOCK)
+    summary = tmp_path / "out" / "multiverse" / "summary"
+    manifest = {"configuration": {"episodes": SIZE.episodes}}
+    (summary / "manifests.json").write_text(json.dumps({"multiverse/000000-000127": manifest}))
+    before = {path.name: path.read_bytes() for path in summary.iterdir()}
+    run = ["run", "multiverse", "--out", str(tmp_path / "out")]
+    for options, lost in (
+        (["--readings", "128", "--seeds", "2"], 128),
+        (["--readings", "128", "--seeds", "1", "--per-block", "3"], 122),
+        (["--readings", "128", "--seeds", "1", "--episodes", "20"], 128),
+        (["--smoke"], 128),
+    ):
+        assert main([*run, *options]) == 2
+        message = capsys.readouterr().err
+        assert f"keep: False; allowed: True, which keeps what the summary in {summary} says of {lost} readin" in message
+    assert {path.name: path.read_bytes() for path in summary.iterdir()} == before
+    require_nothing_lost(tmp_path / "out", sweeps_of(2 * PER_BLOCK + 1), Size(seeds=1, episodes=SIZE.episodes))
+    require_nothing_lost(tmp_path / "nowhere", sweeps_of(1), SIZE)
+
+
+def test_no_table_of_more_readings_is_left_beside_new_verdicts(made_up, tmp_path):
+    first = made_up("out", 2 * PER_BLOCK)
+    assert {"sensitivity.csv", "interactions.csv", "sensitivity.png", "specification.pdf"} <= set(first)
+    summary = tmp_path / "out" / "multiverse" / "summary"
+    (summary / "known.csv").write_text("of an earlier run")
+    (summary / "notes.txt").write_text("of a person")
+    again = made_up("out", 2)
+    assert {path.name for path in summary.iterdir()} == {*again, "notes.txt"}
+    assert not {"sensitivity.csv", "specification.pdf", "known.csv"} & set(again)
 
 
 def test_the_default_has_a_place_in_the_space():

@@ -189,7 +189,7 @@ def test_a_run_under_another_setting_of_jax_is_not_continued(setting, value, fol
         with pytest.raises(store.ConfigurationMismatch, match=rf"numerics\.{field}: .* there, .* wanted"):
             run_sweep(CHEAP, replace(SIZE, seeds=4), folder.parent, QUIET, resume=True)
         with pytest.raises(store.ConfigurationMismatch, match=rf"numerics\.{field}: "):
-            verify(folder, None, {"cheap": CHEAP})
+            list(verify(folder, None, {"cheap": CHEAP}))
     finally:
         jax.config.update(setting, before)
 
@@ -388,12 +388,31 @@ def test_verifying_says_where_and_how_much_results_differ(folder, monkeypatch, c
     assert "folder: " in capsys.readouterr().err
 
 
+def test_verifying_says_of_each_part_what_it_found_until_it_is_interrupted(folder, monkeypatch, capsys):
+    run_sweep(CHEAP, replace(SIZE, seeds=20), folder.parent, QUIET, resume=True)
+    first, *others = parts.parts_of(folder)
+    assert others
+
+    def recomputed(part, sweep):
+        if part.path != first.path:
+            raise KeyboardInterrupt
+        return parts.read_part(part.path)
+
+    monkeypatch.setattr("sweeps.engine.verify.recomputed", recomputed)
+    monkeypatch.setattr(sys, "orig_argv", ["python", "-m", "sweeps", "verify", str(folder)])
+    monkeypatch.setitem(EVERY_SWEEP, "cheap", CHEAP)
+    assert main(["verify", str(folder)]) == interrupts.STATUS
+    captured = capsys.readouterr()
+    assert captured.out == f"{first.path}: the same, bit for bit\n"
+    assert captured.err.endswith(f"interrupted; to go on: python -m sweeps verify {folder}\n")
+
+
 def test_verifying_refuses_results_of_another_configuration(folder):
     changed = replace(CHEAP, design=along("density", "env.radar.density", (9.0,)))
     with pytest.raises(store.ConfigurationMismatch, match=r"design\.density: null there, \[9\.0\] wanted"):
-        verify(folder, None, {"cheap": changed})
+        list(verify(folder, None, {"cheap": changed}))
     with pytest.raises(ValueError, match="results of the sweep 'cheap'"):
-        verify(folder, None, {})
+        list(verify(folder, None, {}))
 
 
 def test_sampled_parts_are_spread_from_first_to_last():
