@@ -1,7 +1,7 @@
 """Refusals: every error names the field, the value and what is allowed, before anything compiles.
 
-Each container is checked in its own module with these tools. Shapes are always checked; numbers only where they are
-known, that is outside `jit` and `vmap`.
+Each container is checked in its own module with these tools. Shapes and types are always checked; numbers only where
+they are known, that is outside `jit` and `vmap`.
 """
 
 from __future__ import annotations
@@ -48,6 +48,8 @@ def require(
         wanted = tuple("any" if w is None else w for w in shape)
         refuse(field, f"shape {got}", f"shape {wanted}, {allowed}")
     if is_traced(value):
+        if getattr(value.dtype, "kind", "V") not in kinds:  # the type of keys has none
+            refuse(field, f"an array of {value.dtype}", allowed)
         return
     array = np.asarray(value)
     if array.dtype.kind not in kinds or not np.isfinite(array).all() or not np.all(test(array)):
