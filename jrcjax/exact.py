@@ -215,8 +215,9 @@ def value_iteration(
     Raises:
       ValueError: naming the argument, the value and what is allowed.
     """
-    require("gamma", gamma, (), lambda x: (x >= 0) & (x < 1), "a discount in [0, 1)")
-    require("tolerance", tolerance, (), is_positive, "a number > 0")
+    # As the numbers that they become: float32 rounds 0.99999999 to 1.
+    require("gamma", gamma, (), lambda x: (x >= 0) & (x.astype(np.float32) < 1), "a float32 discount in [0, 1)")
+    require("tolerance", tolerance, (), lambda x: is_positive(x.astype(np.float32)), "a float32 number > 0")
     return _value_iteration(params, jnp.asarray(gamma, jnp.float32), jnp.asarray(tolerance, jnp.float32))
 
 

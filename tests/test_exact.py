@@ -96,6 +96,12 @@ def test_value_iteration_over_an_axis_of_discounts(environments):
         np.testing.assert_allclose(q, alone, atol=2 * TOLERANCE + EPS * 60.0 / (1.0 - float(gamma)))
 
 
+@pytest.mark.parametrize("argument", [{"gamma": 0.99999999}, {"gamma": 1.0}, {"tolerance": 1e-50}])
+def test_what_float32_rounds_to_a_number_that_is_not_allowed_is_refused(target, argument):
+    with pytest.raises(ValueError, match=rf"^{next(iter(argument))}: .*; allowed: a float32"):
+        exact.value_iteration(target, **argument)
+
+
 def test_larger_gamma_needs_the_transitions(environments):
     # With persistence the next state depends on this one, so Q* is more than the reward and a constant.
     params = environments["random-1"]
