@@ -203,7 +203,8 @@ def _unnamed(leaves: dict[str, jax.Array]) -> dict[str, Any]:
 def _chosen(field: str, value: Any, there: Sequence[Any]) -> Any:
     if value is None and len(there) == 1:
         return there[0]
-    if isinstance(value, bool) or value not in there:
+    value = int(value) if isinstance(value, np.integer) else value
+    if type(value) is not type(there[0]) or value not in there:
         numbers = f"one of {there[0]} to {there[-1]}" if len(there) > 8 else f"one of {', '.join(map(repr, there))}"
-        refuse(field, "None" if value is None else value, f"{numbers}, which the file holds")
+        refuse(field, value if type(value) in (int, float, str) else repr(value), f"{numbers}, which the file holds")
     return value
