@@ -1,12 +1,11 @@
 """Refusals: every error names the field, the value and what is allowed, before anything compiles.
 
-Each container is checked in its own module with these tools. Shapes are always checked; numbers only where they are
-known, that is outside `jit` and `vmap`.
+Each container is checked in its own module with these tools. Shapes and types are always checked; numbers only where
+they are known, that is outside `jit` and `vmap`.
 """
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
 from typing import Any, NoReturn
 
@@ -49,6 +48,8 @@ def require(
         wanted = tuple("any" if w is None else w for w in shape)
         refuse(field, f"shape {got}", f"shape {wanted}, {allowed}")
     if is_traced(value):
+        if getattr(value.dtype, "kind", "V") not in kinds:  # the type of keys has none
+            refuse(field, f"an array of {value.dtype}", allowed)
         return
     array = np.asarray(value)
     if array.dtype.kind not in kinds or not np.isfinite(array).all() or not np.all(test(array)):
@@ -79,24 +80,6 @@ def require_keys(keys: Any, dimensions: int, allowed: str) -> None:
         refuse("key", f"shape {keys.shape}", allowed)
 
 
-def replaced(self: Any, **changes: Any) -> Any:
-    """A copy of a dataclass with the given fields changed; unknown ones are refused."""
-    known = [field.name for field in dataclasses.fields(self)]
-    for name in changes:
-        if name not in known:
-            refuse(f"{type(self).__name__}.replace", name, f"the fields {', '.join(known)}")
-    return dataclasses.replace(self, **changes)
-
-
-def as_array(field: str, value: Any, allowed: str) -> np.ndarray:
-    """Plain numbers as a float32 array; those too large for it become infinite."""
-    try:
-        with np.errstate(over="ignore"):
-            return np.asarray(value, np.float32)
-    except (TypeError, ValueError, OverflowError):
-        refuse(field, str(value), allowed)
-
-
 def is_probability(x: np.ndarray) -> np.ndarray:
     """In [0, 1]."""
     return (x >= 0) & (x <= 1)
@@ -120,9 +103,3 @@ def is_ascending(x: np.ndarray) -> bool:
 def is_distribution(x: np.ndarray) -> bool:
     """Probabilities that sum to 1."""
     return bool(is_probability(x).all() and abs(x.astype(np.float64).sum() - 1) <= _SUM_TOLERANCE)
-
-
-def require_reading(field: str, value: Any, names: tuple[str, ...]) -> None:
-    """Refuses what is not the index of a reading."""
-    allowed = ", ".join(f"{i} ({name})" for i, name in enumerate(names))
-    require(field, value, (), lambda x: np.isin(x, np.arange(len(names))), allowed, kinds="iu")

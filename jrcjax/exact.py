@@ -113,16 +113,39 @@ def _is_data(params: EnvParams) -> Bool[Array, " A"]:
     return jnp.arange(params.num_actions) < params.num_rates
 
 
-def _mean_of_powers(params: EnvParams) -> Float[Array, "S S"]:
-    """(1/T) sum over t < T of P^t, [S, S]: the mean over the T slots of an episode.
+def _chances_of_new_levels(params: EnvParams) -> Float[Array, ...]:
+    """How likely it is that just these factors were drawn anew since the first slot, the mean over the slots, [2] * F.
 
-    The power of a factor's matrix is the same matrix with kappa^t, and that of the whole is the product of theirs.
+    Along a factor's axis 0 stands for a level that was kept, with kappa^t, and 1 for one that was drawn anew.
     """
+    slots = jnp.arange(params.max_steps_in_episode, dtype=jnp.float32)
+    chances = jnp.ones((len(slots), 1), jnp.float32)
+    for factor in params.factors:
+        kept = factor.persistence**slots
+        chances = (chances[:, :, None] * jnp.stack([kept, 1.0 - kept], axis=1)[:, None]).reshape(len(slots), -1)
+    return chances.mean(axis=0).reshape([2] * len(params.factors))
 
-    def power(slot: Float[Array, ""]) -> Float[Array, "S S"]:
-        return _of_all([level_transition(f.prior, f.persistence**slot) for f in params.factors])
 
-    return jax.vmap(power)(jnp.arange(params.max_steps_in_episode, dtype=jnp.float32)).mean(axis=0)
+def _along(axis: int, matrix: Float[Array, "K J"], table: Array) -> Array:
+    """The matrix times a table along one of its axes, whose length J becomes K."""
+    return jnp.moveaxis(jnp.tensordot(matrix, table, (1, axis)), 0, axis)
+
+
+def _mean_of_powers(params: EnvParams, table: Float[Array, "S A"]) -> Float[Array, "S A"]:
+    """(1/T) sum over t < T of P^t times the table, [S, A]: the mean over the T slots of an episode.
+
+    The power of a factor's matrix is kappa^t I + (1 - kappa^t) 1 tau^T. The product of all is a sum over the sets of
+    factors that were drawn anew: the chance of the set, times the table's mean over their levels. The means lie behind
+    the levels, as one more along each axis. So nothing is larger than the table with its means; P is never made.
+    """
+    parts, levels = table.reshape(*params.shape, -1), params.shape
+    for axis, factor in enumerate(params.factors):
+        parts = _along(axis, jnp.concatenate([jnp.eye(levels[axis]), factor.prior[None]]), parts)
+    kept_or_new = np.ix_(*(np.arange(count + 1) // count for count in levels))
+    parts = _chances_of_new_levels(params)[kept_or_new][..., None] * parts
+    for axis, count in enumerate(levels):
+        parts = _along(axis, jnp.concatenate([jnp.eye(count), jnp.ones((count, 1))], axis=1), parts)
+    return parts.reshape(table.shape)
 
 
 @of_params
@@ -135,7 +158,7 @@ def as_observed(params: EnvParams, table: Float[Array, "S A"]) -> Float[Array, "
     is distributed as the state t slots later, and the mean is over the slots of an episode.
     """
     is_first = params.reward_state == RewardState.EPISODE_START
-    return jnp.where(is_first, _mean_of_powers(params) @ table, table)
+    return jnp.where(is_first, _mean_of_powers(params, table), table)
 
 
 @of_params
@@ -192,8 +215,9 @@ def value_iteration(
     Raises:
       ValueError: naming the argument, the value and what is allowed.
     """
-    require("gamma", gamma, (), lambda x: (x >= 0) & (x < 1), "a discount in [0, 1)")
-    require("tolerance", tolerance, (), is_positive, "a number > 0")
+    # As the numbers that they become: float32 rounds 0.99999999 to 1.
+    require("gamma", gamma, (), lambda x: (x >= 0) & (x.astype(np.float32) < 1), "a float32 discount in [0, 1)")
+    require("tolerance", tolerance, (), lambda x: is_positive(x.astype(np.float32)), "a float32 number > 0")
     return _value_iteration(params, jnp.asarray(gamma, jnp.float32), jnp.asarray(tolerance, jnp.float32))
 
 

@@ -14,8 +14,9 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
-from jrcjax.checks import is_not_negative, require
+from jrcjax.checks import is_not_negative, is_traced, refuse, require
 from jrcjax.compiled import compiled
 from jrcjax.exact import as_observed, miss_table, packet_table, policy_of_actions, stationary_distribution
 from jrcjax.model import metrics
@@ -135,6 +136,8 @@ def lowest_miss_detection(params: EnvParams, throughput: Float | float) -> Float
 def policy_at(params: EnvParams, price: Float | float) -> Float:
     """A policy on the front, [S, A] with one 1 per row: it minimises miss detection minus `price` times throughput.
 
+    The convention `radar_slots` has no front (see `contributions`). It is refused, or gives NaN where it is traced.
+
     Args:
       params: the environment.
       price: [] miss detection that a packet per slot is worth, at least 0.
@@ -143,5 +146,9 @@ def policy_at(params: EnvParams, price: Float | float) -> Float:
       ValueError: naming the argument, the value and what is allowed.
     """
     require("price", price, (), is_not_negative, "a number >= 0")
+    convention = params.miss_convention
+    if not is_traced(convention) and (np.asarray(convention) == MissConvention.RADAR_SLOTS).any():
+        refuse("miss_convention", "radar_slots", "all_slots, event_slots, which have a front")
     gain, cost = contributions(params)
-    return policy_of_actions(jnp.argmax(price * gain - cost, axis=1), params.num_actions)
+    policy = policy_of_actions(jnp.argmax(price * gain - cost, axis=1), params.num_actions)
+    return jnp.where(jnp.isnan(cost), jnp.nan, policy)

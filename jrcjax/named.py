@@ -48,15 +48,6 @@ def field_at(kind: type[Container], path: str) -> Field:
     return field_at(field.part, rest) if field.part is not None and rest else field
 
 
-def tree_of(named: Mapping[str, Any], like: Any, separator: str = ".") -> Any:
-    """The pytree with the structure of `like` whose leaves have these names.
-
-    Raises:
-      KeyError: for a leaf that is missing.
-    """
-    return jax.tree.unflatten(jax.tree.structure(like), [named[name] for name in named_arrays(like, separator)])
-
-
 def container_of(kind: type[C], named: Mapping[str, Array], settings: Mapping[str, Any], prefix: str = "") -> C:
     """The container with these arrays, those that are derived included, and settings, by dotted path.
 

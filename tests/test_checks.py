@@ -266,5 +266,19 @@ def test_shapes_are_checked_inside_a_trace(target):
     jax.jit(lambda params: check_params(params))(target)
 
 
+def test_types_are_checked_inside_a_trace(target):
+    env, key = jrcjax.JRCEnv(target), jax.random.key(0)
+    state = jrcjax.EnvState(np.int32(0), np.int32(0), np.int32(0))
+    with pytest.raises(ValueError, match=r"^action: 'an array of float32'; allowed: an integer from 0 to 3"):
+        jax.eval_shape(lambda action: env.step_env(key, state, action, target), 1.7)
+    with pytest.raises(ValueError, match=r"^action: 'an array of bool'"):
+        jax.eval_shape(lambda action: env.step(key, state, action), True)
+    with pytest.raises(ValueError, match=r"^action: 'an array of key<fry>'"):
+        jax.eval_shape(lambda action: env.step(key, state, action), key)
+    jax.eval_shape(lambda action: env.step(key, state, action), 1)
+    with pytest.raises(ValueError, match=r"^event_model: 'an array of float32'; allowed: 0 \("):
+        jax.eval_shape(jax.vmap(lambda model: check_params(target.replace(event_model=model))), np.float32([0, 1]))
+
+
 def test_public_name():
     assert jrcjax.check_params is check_params

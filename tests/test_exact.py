@@ -9,6 +9,7 @@ from significance import ALPHA, mean_differs
 
 from jrcjax import exact
 from jrcjax.model import metrics, slot
+from jrcjax.model.params import Factor
 from jrcjax.readings import EventModel, MissConvention
 
 EPS = float(np.finfo(np.float32).eps)
@@ -93,6 +94,12 @@ def test_value_iteration_over_an_axis_of_discounts(environments):
     for gamma, q in zip(gammas, together, strict=True):
         alone = exact.value_iteration(params, gamma)
         np.testing.assert_allclose(q, alone, atol=2 * TOLERANCE + EPS * 60.0 / (1.0 - float(gamma)))
+
+
+@pytest.mark.parametrize("argument", [{"gamma": 0.99999999}, {"gamma": 1.0}, {"tolerance": 1e-50}])
+def test_what_float32_rounds_to_a_number_that_is_not_allowed_is_refused(target, argument):
+    with pytest.raises(ValueError, match=rf"^{next(iter(argument))}: .*; allowed: a float32"):
+        exact.value_iteration(target, **argument)
 
 
 def test_larger_gamma_needs_the_transitions(environments):
@@ -236,3 +243,27 @@ def test_a_first_state_decides_one_slot_as_the_current_one(environments):
     current = environments["random-1"].replace(max_steps_in_episode=1)
     first = current.replace(reward_state="episode_start")
     np.testing.assert_allclose(exact.expected_reward(first), exact.expected_reward(current), rtol=1e-5, atol=1e-5)
+
+
+def cost_of(function, params):
+    """Floating-point operations of a function of the environment and a policy."""
+    policy = jnp.full((params.num_states, params.num_actions), 1 / params.num_actions)
+    return jax.jit(function).lower(params, policy).cost_analysis()["flops"]
+
+
+def test_the_cost_of_a_policy_grows_with_states_times_levels_not_with_the_square_of_states(target):
+    def with_levels(count):
+        factor = Factor(prior=np.full(count, 1 / count), event_probability=np.zeros(count))
+        return target.replace(road=factor, weather=factor, speed=factor, nearby=factor)
+
+    few, many = (cost_of(exact.evaluate_policy, with_levels(count)) for count in (4, 8))
+    assert many <= 2**4 * 2 * few  # the square would be 2**8 times as much
+
+
+def test_what_is_no_number_stays_none(environments):
+    params = environments["random-1"].replace(reward_state="episode_start")
+    table = jnp.zeros((params.num_states, 2)).at[3, 1].set(jnp.nan)
+    seen = np.asarray(exact.as_observed(params, table))
+    assert (seen[:, 0] == 0).all()
+    assert np.isnan(seen[:, 1]).all()  # the state 3 may have been the first of any
+    np.testing.assert_array_equal(exact.as_observed(params.replace(reward_state="current"), table), table)

@@ -115,3 +115,13 @@ def test_a_convention_without_a_trade_off(target):
 def test_a_negative_price_is_refused(target):
     with pytest.raises(ValueError, match=r"price: -1.0; allowed: a number >= 0"):
         front.policy_at(target, -1.0)
+
+
+def test_there_is_no_policy_on_a_front_that_does_not_exist(target):
+    with pytest.raises(ValueError, match=r"^miss_convention: 'radar_slots'; allowed: all_slots, event_slots"):
+        front.policy_at(target.replace(miss_convention="radar_slots"), 0.1)
+    at = jax.vmap(lambda convention: front.policy_at(target.replace(miss_convention=convention), 0.1))
+    policies = np.asarray(at(jnp.arange(3)))
+    np.testing.assert_array_equal(policies[0], front.policy_at(target, 0.1))
+    assert np.isfinite(policies[1]).all()
+    assert np.isnan(policies[2]).all()

@@ -18,11 +18,11 @@ import numpy as np
 
 from jrcjax.agents import layout
 from jrcjax.agents.saved_agent import SavedAgent
-from jrcjax.checks import refuse, require, require_type
+from jrcjax.checks import refuse, require, require_keys, require_type
 from jrcjax.files import DamagedFile, write_whole
 from jrcjax.keys import key_of
 from jrcjax.learners import Spec
-from jrcjax.learners.hparams import Config, HParams, check_hparams
+from jrcjax.learners.hparams import Config, HParams, check_config, check_hparams
 from jrcjax.learners.q_function import q_function
 from jrcjax.model import states
 from jrcjax.model.params import EnvParams, check_params
@@ -58,6 +58,8 @@ def save_agent(
     """
     require_type("agent", agent, AgentState)
     hparams = HParams() if hparams is None else hparams
+    check_params(env_params)
+    check_hparams(hparams)
     one = jax.tree.map(lambda leaf: leaf[None], (env_params, hparams))
     acting = agent._replace(learner=acting_part(agent.learner))
     agents = {learner: jax.tree.map(lambda leaf: leaf[None, None], acting)}
@@ -87,26 +89,49 @@ def save_agents(
       ValueError: naming the argument, the value and what is allowed, before the file is touched.
     """
     config = Config() if config is None else config
+    require_type("params", env_params, EnvParams)
+    require_type("hparams", hparams, HParams)
+    check_config(config)
+    _check_agents(agents)
     tensors = {f"params.{name}": leaf for name, leaf in named_arrays(env_params).items()}
     tensors |= {f"hparams.{name}": leaf for name, leaf in named_arrays(hparams).items()}
-    points = hparams.discount.shape[0]
     for learner, agent in agents.items():
-        choice("learner", learner, layout.LEARNING)
-        _check_values(learner, agent.learner, spec_of(env_params), config, (points, len(seeds)))
         named = named_arrays(agent.learner) | {"key": jax.random.key_data(_typed(agent.key))}
         tensors |= {f"agents.{learner}.{name}": leaf for name, leaf in named.items()}
     about = {
         "version": layout.VERSION,
         "learners": list(agents),
-        "points": points,
-        "seeds": [int(seed) for seed in seeds],
+        "points": next(iter(np.shape(hparams.discount)), 1),
+        "seeds": [int(seed) if isinstance(seed, np.integer) else seed for seed in seeds],
         "config": _plain_config(config),
         "settings": named_settings(env_params),
         "key_implementation": str(jax.random.key_impl(_typed(next(iter(agents.values())).key))),
         "provenance": provenance(),
     }
-    write_whole(Path(path), layout.content_of({name: np.asarray(leaf) for name, leaf in tensors.items()}, about))
+    arrays = {name: np.asarray(leaf) for name, leaf in tensors.items()}
+    _check_as_read(layout.File(b"", {}, about, arrays), agents, config)
+    write_whole(Path(path), layout.content_of(arrays, about))
     return Path(path)
+
+
+def _check_agents(agents: dict[str, AgentState]) -> None:
+    """Refuses what is not the agents of at least one learner, with a key for each point and seed."""
+    require_type("agents", agents, dict)
+    if not agents:
+        refuse("agents", "{}", "the agents of at least one learner")
+    for learner, agent in agents.items():
+        choice("learner", learner, layout.LEARNING)
+        require_type(f"agents.{learner}", agent, AgentState)
+        require_keys(agent.key, 2, "a key for each point and seed")
+
+
+def _check_as_read(file: layout.File, agents: dict[str, AgentState], config: Config) -> None:
+    """Refuses what could not be loaded again, unless because an agent diverged: a sweep keeps the others."""
+    layout.check(file)
+    points = [_point_of(file, x) for x in range(file.about["points"])]
+    for learner, agent in agents.items():
+        leading = (len(points), len(file.about["seeds"]))
+        _check_values(learner, agent.learner, spec_of(points[0][0]), config, leading)
 
 
 def load_agent(
@@ -139,11 +164,8 @@ def _loaded(path: Path, learner: str | None, point: int | None, seed: int | None
     x = _chosen("point", point, range(about["points"]))
     number = _chosen("seed", seed, about["seeds"])
     config = layout.config_of(about)
-    environment = container_of(EnvParams, _part(file, "params.", (x,)), layout.settings_of(about))
-    hparams = HParams(**_part(file, "hparams.", (x,)))
-    check_params(environment)
-    check_hparams(hparams)
-    values = _part(file, f"agents.{name}.", (x, about["seeds"].index(number)))
+    environment, hparams = jax.tree.map(jnp.asarray, _point_of(file, x))
+    values = jax.tree.map(jnp.asarray, _part(file, f"agents.{name}.", (x, about["seeds"].index(number))))
     key = jax.random.wrap_key_data(values.pop("key"), impl=about["key_implementation"])
     _check_values(name, values, spec_of(environment), config, ())
     finite = "finite numbers, of an agent that did not diverge"
@@ -151,6 +173,15 @@ def _loaded(path: Path, learner: str | None, point: int | None, seed: int | None
         require(f"agents.{name}.{part}", leaf, leaf.shape, lambda x: True, finite)
     layout.check_seal(file)
     return SavedAgent(name, environment, hparams, config, key, _unnamed(values), x, number, about["provenance"])
+
+
+def _point_of(file: layout.File, x: int) -> tuple[EnvParams, HParams]:
+    """Environment and hyperparameters of a point, checked; still arrays of NumPy, which cost the least to check."""
+    environment = container_of(EnvParams, _part(file, "params.", (x,)), layout.settings_of(file.about))
+    hparams = HParams.restored(_part(file, "hparams.", (x,)))
+    check_params(environment)
+    check_hparams(hparams)
+    return environment, hparams
 
 
 def acting_part(learner_state: Any) -> dict[str, Any]:
@@ -165,7 +196,8 @@ def _typed(key: Key) -> Key:
 
 def _plain_config(config: Config) -> dict[str, Any]:
     fields = {field.name: getattr(config, field.name) for field in dataclasses.fields(config)}
-    return fields | {"optimiser": config.optimiser if isinstance(config.optimiser, str) else layout.OPTAX}
+    optimiser = config.optimiser if isinstance(config.optimiser, str) else layout.OPTAX
+    return fields | {"hidden": list(config.hidden), "optimiser": optimiser}
 
 
 def _check_values(learner: str, values: dict[str, Any], spec: Spec, config: Config, leading: tuple[int, ...]) -> None:
@@ -182,10 +214,10 @@ def _check_values(learner: str, values: dict[str, Any], spec: Spec, config: Conf
         )
 
 
-def _part(file: layout.File, prefix: str, place: tuple[int, ...]) -> dict[str, jax.Array]:
+def _part(file: layout.File, prefix: str, place: tuple[int, ...]) -> dict[str, Any]:
     """One entry along the leading axes of every tensor whose name has this prefix, by the rest of its name."""
     named = {name: tensor for name, tensor in file.tensors.items() if name.startswith(prefix)}
-    return {name.removeprefix(prefix): jnp.asarray(tensor[place]) for name, tensor in named.items()}
+    return {name.removeprefix(prefix): tensor[place] for name, tensor in named.items()}
 
 
 def _unnamed(leaves: dict[str, jax.Array]) -> dict[str, Any]:
@@ -203,7 +235,8 @@ def _unnamed(leaves: dict[str, jax.Array]) -> dict[str, Any]:
 def _chosen(field: str, value: Any, there: Sequence[Any]) -> Any:
     if value is None and len(there) == 1:
         return there[0]
-    if isinstance(value, bool) or value not in there:
+    value = int(value) if isinstance(value, np.integer) else value
+    if type(value) is not type(there[0]) or value not in there:
         numbers = f"one of {there[0]} to {there[-1]}" if len(there) > 8 else f"one of {', '.join(map(repr, there))}"
-        refuse(field, "None" if value is None else value, f"{numbers}, which the file holds")
+        refuse(field, value if type(value) in (int, float, str) else repr(value), f"{numbers}, which the file holds")
     return value

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 
 from jrcjax.learners import exploration
 from jrcjax.learners.base import Learner, Source, Spec
-from jrcjax.learners.hparams import Config, HParams
+from jrcjax.learners.hparams import Config, HParams, check_words
 from jrcjax.learners.optimiser import Optimiser, check_optimiser, optimiser_of
 from jrcjax.learners.q_function import QFunction, q_function
 from jrcjax.learners.schedules import epsilon
@@ -89,6 +89,7 @@ def _of(spec: Spec, config: Config) -> DDQN:
     function = q_function(spec, config)
     check_optimiser(config, function)
     layout = uniform.layout_of(states.num_states(spec.shape), spec.num_actions)
+    check_words(config, config.replay_capacity * layout.words)
     return DDQN(spec, config, function, optimiser_of(config), layout)
 
 

@@ -127,6 +127,17 @@ class Config:
         return self.form == "table" or (self.form == "auto" and num_states <= _MAX_TABLE_STATES)
 
 
+def check_words(config: Config, words: int) -> None:
+    """Refuses a replay memory of so many words that their places are no int32.
+
+    Raises:
+      ValueError: naming the field, the value and what is allowed.
+    """
+    if words >= 2**31:
+        allowed = f"a capacity of which the memory has fewer than 2^31 words of 32 bits, not {words}"
+        refuse("config.replay_capacity", config.replay_capacity, allowed)
+
+
 def check_hparams(hparams: HParams) -> None:
     """Checks hyperparameters.
 

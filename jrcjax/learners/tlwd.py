@@ -17,7 +17,7 @@ from jrcjax.checks import refuse
 from jrcjax.keys import PRETRAINING
 from jrcjax.learners import exploration
 from jrcjax.learners.base import Learner, Source, Spec
-from jrcjax.learners.hparams import Config, HParams
+from jrcjax.learners.hparams import Config, HParams, check_words
 from jrcjax.learners.optimiser import Optimiser, check_optimiser, optimiser_of
 from jrcjax.learners.q_function import QFunction, chosen_tree, q_function
 from jrcjax.learners.schedules import epsilon, importance_exponent
@@ -204,6 +204,7 @@ def tlwd(spec: Spec, config: Config) -> Learner:
     check_optimiser(config, function)
     states_and_actions = states.num_states(spec.shape), spec.num_actions
     layout = prioritised.layout_of(*states_and_actions, config.replay_capacity, config.demonstrations, config.n_step)
+    check_words(config, layout.words)
     rule = TLwD(spec, config, function, optimiser_of(config), layout)
     return Learner(
         num_words=exploration.NUM_WORDS + prioritised.NUM_WORDS * config.batch_size,

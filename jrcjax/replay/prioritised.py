@@ -44,6 +44,11 @@ class Layout(NamedTuple):
         """Length of a line."""
         return self.per_line * (1 + self.rows.words)
 
+    @property
+    def words(self) -> int:
+        """Of all lines."""
+        return self.tree.leaves * self.line_words
+
     def word(self, index: Int) -> Int:
         """Where in its line transition number `index` begins."""
         return self.per_line + self.tree.column(index) * self.rows.words

@@ -14,7 +14,7 @@ from jrcjax.model.params import EnvParams
 from jrcjax.training.footprint import check_memory
 from jrcjax.training.parallel import first_agents, over_agents, pad_agents, padded
 from jrcjax.training.rollout import AgentState, Log, check_training, init_agent, learner_for, run_episodes, spec_of
-from jrcjax.training.source import check_source
+from jrcjax.training.source import check_source, first_source
 from jrcjax.training.train import filled_in
 from jrcjax.types import Key
 
@@ -59,7 +59,7 @@ def train_in_chunks(
     if source is None and rule.needs_source:
         refuse("source", "None", "for a learner that transfers a Source per key, as a vmapped train_source returns it")
     if source is not None:
-        check_source(jax.tree.map(lambda leaf: leaf[0], source), spec_of(env_params), config)
+        check_source(first_source(source, count), spec_of(env_params), config)
 
     def started(hparams, agent):
         return init_agent(agent[0], hparams, rule, agent[1])

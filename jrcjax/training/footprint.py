@@ -14,6 +14,7 @@ from jrcjax.learners import Learner, Source, Spec
 from jrcjax.learners.hparams import Config, HParams
 from jrcjax.learners.q_function import q_function
 from jrcjax.machine import physical_memory
+from jrcjax.model.states import num_states
 from jrcjax.replay.n_step import NStepTransition
 
 _COPIES = 2  # of an agent while it advances: the old one and the new
@@ -35,29 +36,42 @@ def agent_bytes(learner: Learner, spec: Spec, config: Config) -> int:
 
 
 def most_bytes(learner: Learner, spec: Spec, config: Config) -> dict[str, int]:
-    """By setting, what it adds to `agent_bytes` at most: a bound that needs no tracing."""
+    """By field, what it adds to `agent_bytes` at most; those of a learner or an optimiser of one's own are unknown."""
     widths = (len(spec.shape), *config.hidden, spec.num_actions)
-    # 64 bytes per transition, weights with their target and two moments, random words of an episode.
+    weights = sum((a + 1) * b for a, b in itertools.pairwise(widths))
+    # 64 bytes per transition, and some for a line that is not full and for single numbers; weights with their target,
+    # two moments and the source's; two tables of all states, of Q-learning or for the target; words of an episode.
     return {
-        "config.replay_capacity": 64 * config.replay_capacity,
+        "config.replay_capacity": 64 * (config.replay_capacity + 16),
         "config.demonstrations": 64 * config.demonstrations,
-        "config.hidden": 16 * sum(a * b for a, b in itertools.pairwise(widths)),
+        "config.n_step": 4 * len(NStepTransition._fields) * config.n_step,
+        "config.hidden": 20 * weights,
         "config.batch_size": 4 * spec.episode_slots * learner.num_words,
+        "shape": 8 * num_states(spec.shape) * spec.num_actions,
     }
+
+
+def bytes_at_most(learner: Learner, spec: Spec, config: Config) -> int:
+    """At least `agent_bytes`; without tracing where only this package says what an agent keeps."""
+    is_own = str(getattr(learner.init, "__module__", "")).startswith("jrcjax.learners.")
+    if is_own and isinstance(config.optimiser, str):
+        return sum(most_bytes(learner, spec, config).values())
+    return agent_bytes(learner, spec, config)
 
 
 def check_memory(learner: Learner, spec: Spec, config: Config, agents: int) -> None:
     """Refuses agents that this machine can't hold.
 
     Raises:
-      ValueError: naming the setting that takes the most, with the estimate.
+      ValueError: naming the field that takes the most, with the estimate.
     """
-    available, at_most = physical_memory(), most_bytes(learner, spec, config)
-    if _COPIES * agents * sum(at_most.values()) <= available:  # without tracing, in nearly all cases
+    available = physical_memory()
+    if _COPIES * agents * bytes_at_most(learner, spec, config) <= available:  # without tracing, in nearly all cases
         return
     needed = _COPIES * agents * agent_bytes(learner, spec, config)
     if needed > available:
+        at_most = most_bytes(learner, spec, config)
         field = max(at_most, key=lambda name: at_most[name])
+        value = spec.shape if field == "shape" else getattr(config, field.removeprefix("config."))
         estimate = f"about {needed / 2**30:.3g} GiB for {agents} agents"
-        allowed = f"sizes that fit {available / 2**30:.3g} GiB of memory, not {estimate}"
-        refuse(field, str(getattr(config, field.removeprefix("config."))), allowed)
+        refuse(field, str(value), f"sizes that fit {available / 2**30:.3g} GiB of memory, not {estimate}")

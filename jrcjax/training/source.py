@@ -94,6 +94,18 @@ def train_source(key: Key, env_params: EnvParams, hparams: HParams, config: Conf
     return source_of(key, policy, agent.learner.weights, env_params, hparams, config), log
 
 
+def first_source(source: Source, agents: int) -> Source:
+    """The first of the sources of many agents, every leaf of which has a leading axis of agents.
+
+    Raises:
+      ValueError: for what is no source, and for another number of them.
+    """
+    require_type("source", source, Source)
+    if any(jnp.shape(leaf)[:1] != (agents,) for leaf in jax.tree.leaves(source)):
+        refuse("source", "other leading axes", f"one source for each of the {agents} keys along the first axis")
+    return jax.tree.map(lambda leaf: leaf[0], source)
+
+
 def check_source(source: Source, spec: Spec, config: Config) -> None:
     """Checks that what one agent handed on fits a problem.
 

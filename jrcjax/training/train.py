@@ -6,9 +6,8 @@ import functools
 from collections.abc import Callable
 
 import jax
-import jax.numpy as jnp
 
-from jrcjax.checks import refuse, require_keys, require_type
+from jrcjax.checks import refuse, require_keys
 from jrcjax.keys import Purpose
 from jrcjax.learners import Learner, LearnerFactory, Source, Spec, make_learner
 from jrcjax.learners.hparams import Config, HParams
@@ -17,7 +16,7 @@ from jrcjax.model.presets import paper_params
 from jrcjax.training.footprint import check_memory
 from jrcjax.training.parallel import first_agents, over_agents, pad_agents, padded
 from jrcjax.training.rollout import AgentState, Log, check_training, init_agent, learner_for, run_episodes, spec_of
-from jrcjax.training.source import check_source, train_source
+from jrcjax.training.source import check_source, first_source, train_source
 from jrcjax.types import Key
 
 
@@ -101,11 +100,7 @@ def train_agents(
     check_training(env_params, hparams, config)
     require_keys(keys, 1, "an array of at least one key, as jax.random.split returns it")
     spec, agents = spec_of(env_params), keys.shape[0]
-    if source is not None:
-        require_type("source", source, Source)
-    if source is not None and any(jnp.shape(leaf)[:1] != (agents,) for leaf in jax.tree.leaves(source)):
-        refuse("source", "other leading axes", f"one source for each of the {agents} keys along the first axis")
-    one_source = jax.tree.map(lambda leaf: leaf[0], source)
+    one_source = None if source is None else first_source(source, agents)
     rule = make_learner(learner, spec, config)
     check_memory(rule, spec, config, padded(agents))
     paper_source = _check_or_choose_source(one_source, rule, spec, config)

@@ -19,7 +19,7 @@ from jrcjax.learners import Learner, Spec, make_learner
 from jrcjax.learners.hparams import Config
 from jrcjax.machine import physical_memory
 from jrcjax.training import parallel
-from jrcjax.training.footprint import agent_bytes, most_bytes
+from jrcjax.training.footprint import agent_bytes, bytes_at_most
 from jrcjax.training.rollout import spec_of
 from sweeps.design import Design
 from sweeps.engine.reference import Reference, reference_of
@@ -122,7 +122,7 @@ class Job:
         if agents > MOST_AGENTS:
             refuse("points", points, f"at most {MOST_AGENTS} agents at a time, not {agents}")
         available = physical_memory()
-        if self._needed(lanes, _most_bytes) > available and (needed := self._needed(lanes, agent_bytes)) > available:
+        if self._needed(lanes, bytes_at_most) > available and (needed := self._needed(lanes, agent_bytes)) > available:
             estimate = f"about {needed / 2**30:.3g} GiB for {agents} agents at a time"
             refuse("points", points, f"what fits {available / 2**30:.3g} GiB of memory, not {estimate}")
         _ = self.points
@@ -132,10 +132,6 @@ class Job:
         names, spec = self.sweep.learners, self.spec
         of_lane = [sum(bytes_of(make_learner(n, spec, g.config), spec, g.config) for n in names) for g in self.groups]
         return _COPIES * max(count * size for count, size in zip(lanes, of_lane, strict=True))
-
-
-def _most_bytes(learner: Learner, spec: Spec, config: Config) -> int:
-    return sum(most_bytes(learner, spec, config).values())
 
 
 # Unlike a cached property of Python 3.11, a cached function lets other threads ask while it works.

@@ -237,6 +237,63 @@ def test_agents_that_are_not_what_is_said_are_not_saved(change, message, trained
     assert list(tmp_path.iterdir()) == []
 
 
+def stacked(tree, points, seeds=None):
+    """The same for so many points, and seeds."""
+    axes = (points,) if seeds is None else (points, seeds)
+    return jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (*axes, *leaf.shape)), tree)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"hparams": stacked(HPARAMS.replace(discount=1.5), 2)}, r"hparams\.discount: 1\.5; allowed"),
+        ({"hparams": stacked(HPARAMS, 1)}, r"params.*: 'float32 of shape \(2,.*; allowed: float32 of shape \(1,"),
+        ({"hparams": HPARAMS}, "params.*: 'float32 of shape"),
+        ({"hparams": 3}, "hparams: int; allowed: HParams"),
+        ({"env_params": "target"}, "params: str; allowed: EnvParams"),
+        ({"env_params": None}, "params: NoneType; allowed: EnvParams"),
+        ({"config": 3}, "config: int; allowed: Config"),
+        ({"config": jrcjax.Config(hidden=(1,) * 101)}, "config.hidden: .*; allowed: a list of at most 100"),
+        ({"seeds": [2_000_000]}, "seeds: 2000000; allowed: an int from 0 to 1000000"),
+        ({"seeds": [0.5]}, "seeds: 0.5; allowed: an int from 0 to 1000000"),
+        ({"seeds": []}, r"seeds: '\[\]'; allowed: a list of different ones"),
+        ({"seeds": [0, 0]}, "seeds: .*a list of different ones"),
+        ({"seeds": [0, 1]}, "agents.ddqn.key: 'uint32 of shape"),
+        ({"agents": {}}, "agents: '{}'; allowed: the agents of at least one learner"),
+        ({"agents": [1]}, "agents: list; allowed: dict"),
+        ({"agents": {"ddqn": 3}}, "agents.ddqn: int; allowed: AgentState"),
+        ({"agents": {"ddqn": rollout.AgentState(KEY, {})}}, r"key: 'shape \(\)'; allowed: a key for each point"),
+    ],
+)
+def test_what_could_not_be_loaded_is_not_saved(change, message, trained, params, file):
+    before = file.read_bytes()
+    agent = rollout.AgentState(trained["ddqn"][0].key, {"weights": trained["ddqn"][0].learner.weights})
+    arguments = {
+        "agents": {"ddqn": stacked(agent, 2, 1)}, "env_params": stacked(params, 2), "hparams": stacked(HPARAMS, 2),
+        "config": CONFIG, "seeds": np.arange(1),
+    }  # fmt: skip
+    with pytest.raises(ValueError, match=message):
+        jrcjax.save_agents(file, **(arguments | change))
+    assert file.read_bytes() == before
+    path = jrcjax.save_agents(file.parent / "sound", **arguments)
+    assert jrcjax.load_agent(path, point=np.int64(1)).point == 1
+    path.unlink()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"env_params": "target"}, "params: str; allowed: EnvParams"),
+        ({"hparams": {"discount": 0.9}}, "hparams: dict; allowed: HParams"),
+        ({"hparams": jrcjax.HParams(discount="much")}, "hparams.discount: "),
+    ],
+)
+def test_arguments_of_another_kind_are_refused_by_name(change, message, trained, params, tmp_path):
+    arguments = {"env_params": params, "hparams": HPARAMS} | change
+    with pytest.raises(ValueError, match=message):
+        jrcjax.save_agent(tmp_path / "agent", trained["ddqn"][0], learner="ddqn", config=CONFIG, **arguments)
+
+
 def test_an_optimiser_without_a_name_leaves_the_agent_usable(trained, params, tmp_path):
     config = jrcjax.Config(episodes=3, hidden=(9,), optimiser=optax.lion(1e-3))
     path = jrcjax.save_agent(tmp_path / "agent", trained["ddqn"][0], params, learner="ddqn", config=config)
@@ -406,6 +463,9 @@ def test_an_agent_of_a_sweep_is_the_one_that_its_results_tell_of(folder, small, 
         ({"learner": "round_robin"}, "learner: 'round_robin'; allowed: one of 'ddqn', 'q_learning'"),
         ({"learner": "ddqn"}, "point: 'None'; allowed: one of 0, 1"),
         ({"learner": "ddqn", "point": 2}, "point: 2; allowed: one of 0, 1"),
+        ({"learner": "ddqn", "point": 0.0, "seed": 0}, "point: 0.0; allowed: one of 0, 1"),
+        ({"learner": "ddqn", "point": False, "seed": 0}, "point: 'False'; allowed: one of 0, 1"),
+        ({"learner": "ddqn", "point": 0, "seed": 1.0}, "seed: 1.0; allowed: one of 0, 1"),
         ({"learner": "ddqn", "point": 0, "seed": 7}, "seed: 7; allowed: one of 0, 1"),
     ],
 )

@@ -1,6 +1,7 @@
 """Hyperparameters and settings: Table I's numbers, and refusals that name the field."""
 
 import dataclasses
+import functools
 
 import jax
 import jax.numpy as jnp
@@ -265,6 +266,18 @@ def test_gradients_are_cut_to_a_norm_over_all_weights_together(norm, scale):
         gradient, optimiser.init(weights), weights, HParams(learning_rate=1.0, max_gradient_norm=norm)
     )
     jax.tree.map(lambda s, w: np.testing.assert_allclose(s, -w, rtol=1e-6), step, wanted)
+
+
+@pytest.mark.parametrize(("learner", "states", "most"), [
+    # Words of a transition: one or two of ids and one of the reward; or two of ids, two numbers and a priority.
+    ("ddqn", (2,) * 24, (2**31 - 1) // 3), ("dpr", (2,) * 24, (2**31 - 1) // 3), ("tlwd", (2,) * 5, 2**29 - 4),
+])  # fmt: skip
+def test_a_replay_memory_whose_words_have_no_places_is_refused(learner, states, most):
+    """Places of words are int32."""
+    make = functools.partial(LEARNERS[learner], Spec(states, 4, 300))
+    make(Config(replay_capacity=most))
+    with pytest.raises(ValueError, match=rf"^config\.replay_capacity: {most + 1}; allowed: .*fewer than 2\^31 words"):
+        make(Config(replay_capacity=most + 1))
 
 
 UNFIT = {

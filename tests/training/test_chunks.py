@@ -1,11 +1,13 @@
 """Training chunk by chunk: what is told, and that nothing else changes."""
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from tiny import tiny_params
 
 import jrcjax
+from jrcjax.learners import Source
 
 
 def test_every_chunk_is_told_and_the_whole_is_that_of_one_go():
@@ -26,6 +28,8 @@ def test_every_chunk_is_told_and_the_whole_is_that_of_one_go():
     [
         ({"chunk": 0}, "chunk: 0; allowed: an int from 1"),
         ({"learner": "dpr"}, "source: 'None'; allowed: for a learner"),
+        ({"source": (1, 2)}, "source: tuple; allowed: Source"),
+        ({"source": Source(jnp.zeros(3), jnp.zeros(3))}, "source: 'other leading axes'; allowed: one .* of the 2 keys"),
     ],
 )
 def test_bad_arguments_are_refused(changed, message):
