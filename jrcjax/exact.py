@@ -140,11 +140,11 @@ def _mean_of_powers(params: EnvParams, table: Float[Array, "S A"]) -> Float[Arra
     """
     parts, levels = table.reshape(*params.shape, -1), params.shape
     for axis, factor in enumerate(params.factors):
-        parts = _along(axis, jnp.concatenate([jnp.eye(levels[axis]), factor.prior[None]]), parts)
+        parts = _along(axis, jnp.concatenate([jnp.eye(levels[axis], dtype=jnp.float32), factor.prior[None]]), parts)
     kept_or_new = np.ix_(*(np.arange(count + 1) // count for count in levels))
     parts = _chances_of_new_levels(params)[kept_or_new][..., None] * parts
     for axis, count in enumerate(levels):
-        parts = _along(axis, jnp.concatenate([jnp.eye(count), jnp.ones((count, 1))], axis=1), parts)
+        parts = _along(axis, jnp.eye(count, count + 1, dtype=jnp.float32).at[:, count].set(1.0), parts)
     return parts.reshape(table.shape)
 
 

@@ -122,7 +122,9 @@ def _check_agents(agents: dict[str, AgentState]) -> None:
     for learner, agent in agents.items():
         choice("learner", learner, layout.LEARNING)
         require_type(f"agents.{learner}", agent, AgentState)
-        require_keys(agent.key, 2, "a key for each point and seed")
+        # From other processes agents come as arrays of NumPy, their keys in the old style.
+        key = jnp.asarray(agent.key) if isinstance(agent.key, np.ndarray) else agent.key
+        require_keys(key, 2, "a key for each point and seed")
 
 
 def _check_as_read(file: layout.File, agents: dict[str, AgentState], config: Config) -> None:

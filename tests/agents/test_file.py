@@ -280,6 +280,18 @@ def test_what_could_not_be_loaded_is_not_saved(change, message, trained, params,
     path.unlink()
 
 
+def test_agents_of_another_process_are_saved(trained, params, tmp_path):
+    """They come as arrays of NumPy, and so do the words of their keys."""
+    here = stacked(trained["ddqn"][0]._replace(learner={"weights": trained["ddqn"][0].learner.weights}), 1, 1)
+    there = jax.device_get(here._replace(key=jax.random.key_data(here.key)))
+    rest = {"env_params": stacked(params, 1), "hparams": stacked(HPARAMS, 1), "config": CONFIG, "seeds": (0,)}
+    files = [
+        jrcjax.save_agents(tmp_path / name, {"ddqn": one}, **rest)
+        for name, one in zip("ab", (here, there), strict=True)
+    ]
+    assert files[0].read_bytes() == files[1].read_bytes()
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
