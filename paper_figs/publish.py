@@ -16,12 +16,12 @@ import shutil
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import tyro
 
 from jrcjax.checks import refuse
-from jrcjax.files import write_text
+from jrcjax.files import write_text, write_whole
 from paper_figs import record
 from paper_figs.analysis import front
 from paper_figs.claims.delta import Delta
@@ -37,8 +37,8 @@ from sweeps.sweep import Size
 
 ROOT = Path(__file__).parents[1]
 TABLES = ("claims.json", "regret.csv", "seeds_needed.csv")
-STUDIES = ("robustness", "multiverse", "reconstruction")
-"""Whose summaries are published as they are."""
+SUMMARIES = {"robustness": "manifests.json", "multiverse": "manifests.json", "reconstruction": PRESET_FILE}
+"""A file that each study's summary has. They are published as they are."""
 _OUT = re.compile(r" --out [^ \"]+")  # of a command in a manifest
 _TEXTS = ("*.md", "paper_figs/*.md", "docs/**/*.md")
 
@@ -68,40 +68,55 @@ def texts(root: Path) -> list[Path]:
     return sorted({path for pattern in _TEXTS for path in root.glob(pattern)})
 
 
-def publish_figures(out: Path, target: Path, preset: str = Size.preset) -> list[Path]:
-    """Copies figures, tables, verdicts and manifests, and writes the numbers that texts quote.
+class Publication(NamedTuple):
+    """What goes to one folder: found whole and in order before anything of any is written."""
 
-    Nothing is written unless all is there, and of the run that the manifests describe.
+    folder: Path
+    files: dict[str, bytes]
+    """By name in `folder`."""
+    alone: bool = False
+    """Whether no other file stays there."""
+
+    def write(self) -> list[Path]:
+        """Writes the files, and returns them."""
+        fresh = self.folder.with_name(f"{self.folder.name}.new") if self.alone else self.folder
+        if self.alone:
+            shutil.rmtree(fresh, ignore_errors=True)  # of an interrupted run
+        for name, content in self.files.items():
+            (fresh / name).parent.mkdir(parents=True, exist_ok=True)
+            write_whole(fresh / name, content)
+        if self.alone:
+            shutil.rmtree(self.folder, ignore_errors=True)
+            fresh.rename(self.folder)
+        return [self.folder / name for name in self.files]
+
+
+def figures_from(out: Path, folder: Path, preset: str = Size.preset) -> Publication:
+    """Figures, tables, verdicts and manifests, and the numbers that texts quote.
 
     Args:
       out: what `make figures` wrote.
-      target: folder of published figures.
+      folder: of published figures.
       preset: of these figures.
 
-    Returns:
-      The files in `target`.
-
     Raises:
-      ValueError: naming what is missing, or is of another run.
+      ValueError: naming what is missing, or is of another run than the manifests describe.
       OSError: if results are missing.
     """
     figures = [figure.name for figure in FIGURES]
-    folder = results_folder(out, Size(preset=preset))
+    results = results_folder(out, Size(preset=preset))
     copies = [out / name for name in TABLES]
     copies += [out / f"{name}{suffix}" for name in (*figures, front.NAME) for suffix in (".pdf", ".png", ".csv")]
-    manifests = {name: folder / name / store.MANIFEST for name in (*figures, "source")}
+    manifests = {name: results / name / store.MANIFEST for name in (*figures, "source")}
     _require_files(out, [*copies, *manifests.values(), out / record.FILE])
     seeds = record.seeds_in(out, record.record_of(Size(preset=preset), figures, Delta()))
     for path in manifests.values():
         _require_seeds(path, seeds)
-    results = {figure.name: figure.results(folder, seeds) for figure in FIGURES}
-    numbers = json.dumps(numbers_of(results, preset), indent=2, allow_nan=False) + "\n"
-    target.mkdir(parents=True, exist_ok=True)
-    return [
-        *(Path(shutil.copyfile(path, target / path.name)) for path in copies),
-        *(_publish_manifest(path, target / f"{name}.manifest.json") for name, path in manifests.items()),
-        write_text(target / "numbers.json", numbers),
-    ]
+    numbers = numbers_of({figure.name: figure.results(results, seeds) for figure in FIGURES}, preset)
+    files = {path.name: path.read_bytes() for path in copies}
+    files |= {f"{name}.manifest.json": _without_place(path) for name, path in manifests.items()}
+    files["numbers.json"] = (json.dumps(numbers, indent=2, allow_nan=False) + "\n").encode()
+    return Publication(folder, files)
 
 
 def _require_files(out: Path, paths: list[Path]) -> None:
@@ -118,35 +133,55 @@ def _require_seeds(manifest: Path, seeds: int) -> None:
         refuse("seeds", seeds, f"figures of all that {manifest} tells of, {store.in_words(set(there))}")
 
 
-def _publish_manifest(path: Path, target: Path) -> Path:
-    """Copies what says where results come from, but for where they lay on the machine that made them."""
-    return write_text(target, _OUT.sub("", path.read_text(encoding="utf-8")))
+def _without_place(manifest: Path) -> bytes:
+    """What says where results come from, but for where they lay on the machine that made them."""
+    return _OUT.sub("", manifest.read_text(encoding="utf-8")).encode()
 
 
-def publish_study(summary: Path, target: Path) -> Path:
-    """Copies a study's summary in place of the one that is published, of which no file stays."""
-    fresh = target.with_name(f"{target.name}.new")
-    shutil.rmtree(fresh, ignore_errors=True)
-    shutil.copytree(summary, fresh)
-    manifests = fresh / "manifests.json"
-    if manifests.is_file():
-        _publish_manifest(manifests, manifests)
-    shutil.rmtree(target, ignore_errors=True)
-    return fresh.rename(target)
+def study_from(summary: Path, folder: Path) -> Publication:
+    """A study's summary, in place of the one that is published.
+
+    Raises:
+      ValueError: naming what is missing.
+    """
+    name = SUMMARIES[folder.name]
+    if not (summary / name).is_file():
+        refuse(folder.name, str(summary), f"the folder of a summary, with {name}")
+    paths = [path for path in sorted(summary.rglob("*")) if path.is_file()]
+    files = {path.relative_to(summary).as_posix(): path.read_bytes() for path in paths}
+    if (manifests := summary / "manifests.json").is_file():
+        files[manifests.name] = _without_place(manifests)
+    return Publication(folder, files, alone=True)
 
 
-def publish_preset(file: Path, target: Path) -> Path:
-    """Copies a preset to where its name stands for it."""
-    target.mkdir(parents=True, exist_ok=True)
-    return Path(shutil.copyfile(file, target / file.name))
+def sweep_from(results: Path, folder: Path) -> Publication:
+    """Tables, figures and manifest of a custom sweep.
+
+    Raises:
+      OSError: if there is no manifest.
+    """
+    summary = [path for path in sorted(results.glob(f"{results.name}*")) if path.suffix in (".csv", ".pdf", ".png")]
+    files = {path.name: path.read_bytes() for path in summary}
+    return Publication(folder, files | {store.MANIFEST: _without_place(results / store.MANIFEST)})
 
 
-def publish_sweep(folder: Path, target: Path) -> list[Path]:
-    """Copies tables, figures and manifest of a custom sweep; returns the files in `target`."""
-    target.mkdir(parents=True, exist_ok=True)
-    summary = [path for path in sorted(folder.glob(f"{folder.name}*")) if path.suffix in (".csv", ".pdf", ".png")]
-    written = [Path(shutil.copyfile(path, target / path.name)) for path in summary]
-    return [*written, _publish_manifest(folder / store.MANIFEST, target / store.MANIFEST)]
+def publications(options: Options, root: Path) -> list[Publication]:
+    """All that the options ask for.
+
+    Raises:
+      ValueError: naming what is missing, or does not fit.
+      OSError: if files can't be read.
+    """
+    published, presets = root / "published", root / "sweeps" / "presets"
+    found = [figures_from(options.figures, published / "figures")] if options.figures else []
+    found += [study_from(folder, published / name) for name in SUMMARIES if (folder := getattr(options, name))]
+    best = presets / PRESET_FILE
+    if options.reconstruction:
+        best = options.reconstruction / PRESET_FILE
+        found.append(Publication(presets, {PRESET_FILE: best.read_bytes()}))
+    if options.best:
+        found.append(figures_from(options.best, published / BEST, preset_of(str(best))))
+    return [*found, *(sweep_from(folder, published / folder.name) for folder in options.custom)]
 
 
 def renew_texts(root: Path) -> list[Path]:
@@ -165,20 +200,8 @@ def main(args: list[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     options = tyro.cli(Options, prog="python -m paper_figs.publish", args=args, config=FLAGS)
     root = options.root or ROOT
-    written = []
     try:
-        if options.figures:
-            written += publish_figures(options.figures, root / "published" / "figures")
-        for name in STUDIES:
-            if summary := getattr(options, name):
-                written.append(publish_study(summary, root / "published" / name))
-        if options.reconstruction:
-            written.append(publish_preset(options.reconstruction / PRESET_FILE, root / "sweeps" / "presets"))
-        if options.best:
-            preset = preset_of(str(root / "sweeps" / "presets" / PRESET_FILE))
-            written += publish_figures(options.best, root / "published" / BEST, preset)
-        for folder in options.custom:
-            written += publish_sweep(folder, root / "published" / folder.name)
+        written = [path for publication in publications(options, root) for path in publication.write()]
         written += renew_texts(root)
     except (ValueError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)

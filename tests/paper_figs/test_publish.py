@@ -80,7 +80,7 @@ def drawn(tmp_path, monkeypatch):
 
 
 def test_figures_are_published_with_the_manifests_of_their_run(drawn, tmp_path):
-    written = publish.publish_figures(drawn, tmp_path / "figures")
+    written = publish.figures_from(drawn, tmp_path / "figures").write()
     assert {path.name for path in written} == {path.name for path in (PUBLISHED / "figures").iterdir()}
     for path in written:
         assert path.name == "numbers.json" or path.read_bytes() == (PUBLISHED / "figures" / path.name).read_bytes()
@@ -104,29 +104,46 @@ def test_figures_are_published_with_the_manifests_of_their_run(drawn, tmp_path):
 def test_figures_of_another_run_than_the_manifests_are_not_published(drawn, tmp_path, size, figures, delta, message):
     record.write(drawn, record.record_of(size, [figure.name for figure in figures], delta))
     with pytest.raises(ValueError, match=message):
-        publish.publish_figures(drawn, tmp_path / "figures")
-    assert not (tmp_path / "figures").exists()
+        publish.figures_from(drawn, tmp_path / "figures")
 
 
 @pytest.mark.parametrize("name", ["fig9.png", record.FILE, "results/paper-1000-episodes/source/manifest.json"])
 def test_with_a_file_missing_nothing_is_published(drawn, tmp_path, name):
     (drawn / name).unlink()
     with pytest.raises(ValueError, match=f"folder: '{drawn}'; allowed: one to which .* all figures: {name}$"):
-        publish.publish_figures(drawn, tmp_path / "figures")
-    assert not (tmp_path / "figures").exists()
+        publish.figures_from(drawn, tmp_path / "figures")
 
 
 def test_a_summary_is_published_whole_and_without_files_of_the_one_before(tmp_path):
-    summary, target = tmp_path / "summary", tmp_path / "published" / "multiverse"
-    for folder, name in ((summary / "tried", "new.csv"), (target, "known.csv")):
-        folder.mkdir(parents=True)
-        (folder / name).write_text("x")
-    with pytest.raises(OSError, match="nowhere"):
-        publish.publish_study(tmp_path / "nowhere", target)
-    assert (target / "known.csv").is_file()
-    assert publish.publish_study(summary, target) == target
-    assert [path.relative_to(target).as_posix() for path in target.rglob("*.*")] == ["tried/new.csv"]
-    assert [path.name for path in target.parent.iterdir()] == ["multiverse"]
+    summary, folder = tmp_path / "summary", tmp_path / "published" / "multiverse"
+    for path in (summary / "manifests.json", summary / "tried" / "new.csv", folder / "known.csv"):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("x")
+    written = publish.study_from(summary, folder).write()
+    assert [path.relative_to(folder).as_posix() for path in written] == ["manifests.json", "tried/new.csv"]
+    assert sorted(path for path in folder.rglob("*") if path.is_file()) == written
+    assert [path.name for path in folder.parent.iterdir()] == ["multiverse"]
+
+
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        ("--best={nowhere}", "allowed: one to which `make figures` has written all figures"),
+        ("--reconstruction={nowhere}", "reconstruction: '{nowhere}'; allowed: the folder of a summary, with best.toml"),
+        ("--multiverse={nowhere}", "multiverse: '{nowhere}'; allowed: the folder of a summary, with manifests.json"),
+        ("--custom={nowhere}", "nowhere/manifest.json"),
+    ],
+)
+def test_where_one_of_several_is_missing_none_is_published(tmp_path, capsys, option, message):
+    root, nowhere = tmp_path / "project", tmp_path / "nowhere"
+    preset = root / "sweeps" / "presets" / "best.toml"
+    preset.parent.mkdir(parents=True)
+    preset.write_text('[set]\n"hparams.learning_rate" = 3e-5\n')
+    before = {path: path.read_bytes() for path in root.rglob("*.*")}
+    options = [f"--robustness={PUBLISHED / 'robustness'}", f"--custom={PUBLISHED / 'huber'}"]
+    assert publish.main([*options, option.format(nowhere=nowhere), f"--root={root}"]) == 2
+    assert message.format(nowhere=nowhere) in capsys.readouterr().err
+    assert {path: path.read_bytes() for path in root.rglob("*.*")} == before
 
 
 def test_quoted_numbers_are_those_of_the_results():
