@@ -131,6 +131,12 @@ def negligible(differences: Sequence[Interval], delta: float) -> bool | None:
 
 def judge(claim: Claim, results: Results) -> Judgement:
     """The verdict on a claim from the results of its figure."""
+    agents = [str(name) for name in results.data["algorithm"].values]
+    diverged = sum(divergence.count(results.data, name) for name in agents)
+    return dataclasses.replace(_judged(claim, results), n_diverged=diverged)
+
+
+def _judged(claim: Claim, results: Results) -> Judgement:
     try:
         measured = claim.measure(results)
     except Unknown as unknown:
@@ -140,11 +146,8 @@ def judge(claim: Claim, results: Results) -> Judgement:
     least = results.rules.least_seeds
     if results.n_seeds < least:
         no_number = f"{results.n_seeds} seeds, {least} needed for a verdict"
-        estimated = dataclasses.replace(_unknown(claim, no_number, results.n_seeds), value=value, delta=delta)
-    else:
-        estimated = _decided(claim, measured, Interval(value, low, high), delta, results.n_seeds)
-    agents = [str(name) for name in results.data["algorithm"].values]
-    return dataclasses.replace(estimated, n_diverged=sum(divergence.count(results.data, name) for name in agents))
+        return dataclasses.replace(_unknown(claim, no_number, results.n_seeds), value=value, delta=delta)
+    return _decided(claim, measured, Interval(value, low, high), delta, results.n_seeds)
 
 
 def _decided(claim: Claim, measured: Measured, interval: Interval, delta: float | None, n_seeds: int) -> Judgement:

@@ -273,10 +273,13 @@ def test_points_that_are_missing_leave_the_claims_that_need_them_undecided():
     ]
 
 
-def test_diverged_agents_of_a_figure_are_counted():
-    data = worlds.as_the_paper_says()["fig9"]
+@pytest.mark.parametrize("episodes", [1000, 50])
+def test_diverged_agents_of_a_figure_are_counted(episodes):
+    data = worlds.as_the_paper_says(episodes=episodes)["fig9"]
     data["first_diverged"].loc[{"point": 1, "seed": [2, 5]}] = 3
-    assert {j.n_diverged for j in claims_of_figure("fig9", data)} == {2}
+    found = claims_of_figure("fig9", data)
+    assert {j.n_diverged for j in found} == {2}
+    assert any(math.isnan(j.value) for j in found) == (episodes == 50)  # of claims without a number, too
 
 
 # --- the claims as data -----------------------------------------------------------------------------------------------
