@@ -18,7 +18,7 @@ import numpy as np
 from paper_figs.analysis import divergence
 from paper_figs.analysis.intervals import Interval
 from paper_figs.claims.effects import Effect, Measured
-from paper_figs.claims.results import Results, Unknown
+from paper_figs.claims.results import Results, Rules, Unknown
 
 SUPPORTED, CONTRADICTED, UNDECIDED = VERDICTS = ("supported", "contradicted", "undecided")
 Limit = float | tuple[float, float]
@@ -196,19 +196,21 @@ def from_json(rows: list[dict]) -> list[Judgement]:
     """The judgements that `as_json` wrote.
 
     A limit that is null beside one that is a number is infinite, and so is a value that is null with its upper limit;
-    a value that is null between two numbers is none.
+    a value that is null between two numbers is none. Both limits are null where there are too few seeds for an interval
+    or no value, and else where it has no bounds.
     """
     return [Judgement(**row | _finite_or_not(row)) for row in rows]
 
 
 def _finite_or_not(row: dict) -> dict[str, Any]:
     low, high = row["ci_low"], row["ci_high"]
-    bounded = low is not None or high is not None
+    is_bounded = low is not None or high is not None
+    has_interval = is_bounded or (row["value"] is not None and row["n_seeds"] >= Rules().least_seeds)
     limit = row["limit"]
     return {
-        "value": _restored(row["value"], math.inf if bounded and high is None else math.nan),
-        "ci_low": _restored(low, -math.inf if bounded else math.nan),
-        "ci_high": _restored(high, math.inf if bounded else math.nan),
+        "value": _restored(row["value"], math.inf if is_bounded and high is None else math.nan),
+        "ci_low": _restored(low, -math.inf if has_interval else math.nan),
+        "ci_high": _restored(high, math.inf if has_interval else math.nan),
         "limit": tuple(limit) if isinstance(limit, list) else limit,
     }
 

@@ -318,6 +318,16 @@ def test_what_is_not_known_of_any_pair_is_no_number_after_json():
     assert words.measured(after) == "–"
 
 
+def test_an_interval_without_bounds_is_one_after_json():
+    data = worlds.as_the_paper_says(seeds=5, episodes=450)["fig7"]
+    data["throughput"].loc[{"algorithm": "ddqn"}] = np.array([0.0] * 4 + [500.0])[None, :, None]  # its mean may be 0
+    before = {j.claim: j for j in claims_of_figure("fig7", data)}["C12 (throughput, DDQN)"]
+    assert (before.value, before.ci_low, before.ci_high) == (1.0, -math.inf, math.inf)
+    (after,) = judge.from_json(json.loads(json.dumps(judge.as_json([before]), allow_nan=False)))
+    assert after == before
+    assert words.measured(after) == "1 (no bound to no bound)"
+
+
 def test_no_effect_depends_on_the_order_of_learners_points_or_seeds():
     for figure, data in worlds.as_the_paper_says(episodes=450).items():
         turned = data.isel(algorithm=slice(None, None, -1), point=slice(None, None, -1), seed=slice(None, None, -1))
