@@ -20,11 +20,13 @@ def never_judged_so(published: Path, claims: list[str]) -> str:
     shares = csv_of(published, MULTIVERSE.name, "claims").query("claim in @claims and judged > 0 and supported == 0")
     if shares.empty:
         return "Each of these is supported in some of the multiverse's readings with verdicts."
-    seeds = seeds_of(multiverse.judged(csv_of(published, MULTIVERSE.name, "verdicts")))
+    judged = multiverse.judged(multiverse.sampled(csv_of(published, MULTIVERSE.name, "verdicts")))
+    seeds = seeds_of(judged.loc[judged.claim.isin(shares.claim)])
+    undecided = np.average(shares.undecided, weights=shares.judged)
     return (
         f"Of these, {seeds} seeds support none in the {from_to(set(shares.judged.astype(int)))} readings of the "
         f"multiverse with verdicts, so they would in at most {percent(shares.supported_high.max())} of readings (each "
-        f"by itself, and as if readings of a block were independent); but {percent(shares.undecided.mean())} of these "
+        f"by itself, and as if readings of a block were independent); but {percent(undecided)} of these "
         f"verdicts are undecided: {'; '.join(shares.claim)}."
     )
 

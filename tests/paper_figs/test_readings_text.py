@@ -242,6 +242,20 @@ def test_readings_of_a_single_seed_have_no_verdicts(published):
     assert verdicts_text.judged_table(published).count("\n") == 1
 
 
+def test_what_is_supported_nowhere_counts_the_verdicts_of_these_statements(published):
+    path = published / "multiverse" / "claims.csv"
+    table = pd.read_csv(path).set_index("claim")
+    table.loc["C4", ["judged", "undecided"]] = [1, 1.0]  # 1 of 1, beside 30 of 120
+    table.loc["C3 (TLwD)", "judged"] = 120
+    table.reset_index().to_csv(path, index=False)
+    verdicts = published / "multiverse" / "verdicts.csv"
+    others = [{"reading": 0, "claim": "C4", "n_seeds": 100}, {"reading": 7, "claim": "C5 (highest)", "n_seeds": 16}]
+    pd.concat([pd.read_csv(verdicts), pd.DataFrame(others)]).to_csv(verdicts, index=False)
+    text = verdicts_text.never_judged_so(published, ["C3 (TLwD)", "C4"])
+    assert text.startswith("Of these, 5 seeds support none in the 1 to 120 readings of the multiverse with verdicts,")
+    assert "but 25.6 % of these verdicts are undecided: C3 (TLwD); C4." in text
+
+
 def test_what_two_questions_decide_together_is_told_apart(published):
     text = " ".join(readings_text.readings_list(published).split())
     assert "and in all others, C5 (highest) holds in 100 % and 0 % (with a trade-off: " in text
