@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Iterable
 
@@ -14,8 +15,8 @@ def table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
 
 
 def percent(share: float) -> str:
-    """A share in per cent."""
-    return f"{100 * share:.3g} %"
+    """A share in per cent; a dash for one of nothing."""
+    return "–" if math.isnan(share) else f"{100 * share:.3g} %"
 
 
 def listed(items: Iterable[str]) -> str:

@@ -182,9 +182,11 @@ def best_values_table(published: Path) -> str:
     """The best readings, answer by answer, beside the default."""
     tried, confirmed, _ = _tables(published)
     by_name = tried.set_index("reading")
-    names = (DEFAULT, best_for(confirmed, ALL).reading.iloc[0], with_trade_off(tried))
-    rows = [(f"`{r.path}`", r.label, *(short(by_name.loc[name, r.path]) for name in names)) for r in READINGS]
-    return table(("field", "question", "default", "best for all", "best with a trade-off"), rows)
+    best = {"default": DEFAULT, "best for all": best_for(confirmed, ALL).reading.iloc[0]}
+    if not worth(tried).empty:
+        best["best with a trade-off"] = with_trade_off(tried)
+    rows = [(f"`{r.path}`", r.label, *(short(by_name.loc[name, r.path]) for name in best.values())) for r in READINGS]
+    return table(("field", "question", *best), rows)
 
 
 def confirmed_table(published: Path) -> str:

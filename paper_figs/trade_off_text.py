@@ -46,11 +46,12 @@ def trade_off_list(published: Path) -> str:
     has_one = pd.Series(True, worthwhile.index).reindex(worthwhile.index.append(idle.index), fill_value=False)
     answers = _answers_without(worthwhile, idle)
     fields = "; ".join(f"`{path}` {answer}" for path, answer in answers) or "none"
+    loses = f"the best one loses at least {percent(worthwhile.lost_by_one_action.min())}"
+    if not idle.empty:
+        loses += f"; in all others at most {percent(idle.lost_by_one_action.max())}"
     left = [len(of) - np.count_nonzero(_has_one_of(answers, of)) for of in (worthwhile, idle)]
     sentences = [
-        f"In {share_of(has_one)} of the multiverse's readings no single action is optimal in the target: the "
-        f"best one loses at least {percent(worthwhile.lost_by_one_action.min())}; in all others at most "
-        f"{percent(idle.lost_by_one_action.max())}.",
+        f"In {share_of(has_one)} of the multiverse's readings no single action is optimal in the target: {loses}.",
         f"Answers with which no reading has a trade-off: {fields}. Of the {sum(left)} readings without them {left[0]} "
         "have one.",
         "On their side in readings with a trade-off, and in those without one: "

@@ -380,6 +380,19 @@ def test_a_space_without_a_trade_off(published):
     pd.read_csv(path).assign(lost_by_one_action=0.0).to_csv(path, index=False)
     text = trade_off_text.trade_off_list(published)
     assert text == "- One action in every state is optimal in the target of all 2 readings."
+    assert reconstruction_text.best_values_table(published).startswith(
+        "| field | question | default | best for all |\n"
+    )
+    first_page = " ".join(readings_text.readings_list(published).split())
+    assert "C5 (highest) holds in 100 % and 0 % (with a trade-off: – and –);" in first_page
+
+
+def test_a_space_in_which_all_is_a_trade_off(published):
+    path = published / "reconstruction" / "tried.csv"
+    pd.read_csv(path).assign(lost_by_one_action=0.05).to_csv(path, index=False)
+    text = " ".join(trade_off_text.trade_off_list(published).split())
+    assert "no single action is optimal in the target: the best one loses at least 5 %. - Answers" in text
+    assert "and not among these readings" in text
 
 
 def test_a_world_where_each_statement_holds_somewhere(published):
