@@ -7,7 +7,7 @@ import json
 import re
 import shlex
 import struct
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,7 @@ from sweeps.preset import environment_of, label_of, slots_of
 from sweeps.sweep import Size
 
 _TEMPLATE = Path(__file__).with_name("report.html.jinja")
+_MORE_SEEDS = 10  # at least, to decide more
 _OPTIMUM = ("reward", "throughput", "miss_detection")
 SIGNS = {"supported": "✓", "contradicted": "✗", "undecided": "?"}
 """Signs of the verdicts, which are told apart without their colours."""
@@ -94,6 +95,7 @@ def render(
         slots=slots_of(size.preset),
         diverged=diverged,
         command=_command(size, only, delta or Delta()),
+        more=_command(replace(size, seeds=max(3 * size.seeds, _MORE_SEEDS)), only, delta or Delta()),
         settings=_settings(parsed),
         made=_made(parsed),
         manifests=manifests,

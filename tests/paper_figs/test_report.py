@@ -178,6 +178,15 @@ def test_the_command_makes_the_page_anew(size, only, delta, command):
     assert size_of(options.seeds, options.episodes, options.preset, options.smoke) == size
 
 
+def test_what_to_do_next_is_about_the_run_that_the_page_shows():
+    size, manifest = Size(seeds=4, episodes=450, preset="paper_table"), (REFERENCE / "fig9.manifest.json").read_text()
+    claims = [dataclasses.replace(judgements()[0], verdict="undecided")]
+    page = report.render(size, {}, claims, [], [], {"fig9": manifest}, (9,))
+    # Of another preset or length no seeds are there.
+    assert "make figures ARGS=&#39;--seeds 12 --episodes 450 --preset paper_table --only 9&#39;" in page
+    assert "sweeps verify OUT/results/paper_table-450-episodes/fig9 --parts 1" in page
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="needs a Chromium")
 def test_claims_are_sorted_and_figures_enlarged(page, tmp_path):
