@@ -73,8 +73,9 @@ def _step_sizes_in_words(published: Path) -> str:
     ddqn = {f"{rate:.3g}": here.loc["ddqn"] for rate, (here, _) in grid.items()}
     in_all = {rate: f"{of['median']:.0f}" for rate, of in ddqn.items() if of["reached"] == 1}
     median = f" (median episode {', '.join(in_all.values())})" if in_all else ""
-    others = sorted(of["reached"] for of in ddqn.values() if of["reached"] < 1)
-    in_some = f", in {percent(others[0])} to {percent(others[-1])} with the others" if others else ""
+    others = [of["reached"] for of in ddqn.values() if of["reached"] < 1]
+    ends = dict.fromkeys(map(percent, (min(others), max(others)))) if others else ()
+    in_some = f", in {' to '.join(ends)} with the others" if ends else ""
     seeds = max(int(here.n_seeds.max()) for here, _ in grid.values())
     return (
         f"All else as by default ({seeds} seeds), TLwD earns more than DDQN at every p_1^v with step sizes of "

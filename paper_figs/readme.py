@@ -174,7 +174,7 @@ def headline(published: Path) -> str:
     found = {j.claim: j for j in judgements(published)}
     numbers, verdict = _numbers(published)["fig5b"], {claim: words.verdict(j) for claim, j in found.items()}
     counts = Counter(j.verdict for j in found.values())
-    tally = ", ".join(f"{counts[each]} are {each}" for each in VERDICTS)
+    tally = ", ".join(f"{counts[each]} {'is' if counts[each] == 1 else 'are'} {each}" for each in VERDICTS)
     text = (
         f"Of the {len(found)} statements that the paper's claims come down to, {tally} under the default reading. "
         f"That TLwD converges faster than DDQN is {verdict['C3 (TLwD)']}; that it earns most at every point of Fig. 6 "

@@ -52,6 +52,16 @@ def test_a_changed_result_changes_the_text_and_only_between_the_marks(tmp_path):
     assert publish.renew_texts(tmp_path) == []
 
 
+def test_one_statement_is_and_others_are(tmp_path):
+    shutil.copytree(PUBLISHED, tmp_path / "published")
+    claims = tmp_path / "published" / "figures" / "claims.json"
+    rows = json.loads(claims.read_text())
+    one = [row | {"verdict": "supported" if i == 0 else "contradicted"} for i, row in enumerate(rows)]
+    claims.write_text(json.dumps(one))
+    text = " ".join(readme.headline(tmp_path / "published").split())
+    assert f"come down to, 1 is supported, {len(rows) - 1} are contradicted, 0 are undecided under" in text
+
+
 def test_an_unknown_block_is_refused():
     text = "<!-- made by python -m paper_figs.publish: nothing -->\n<!-- end of nothing -->"
     with pytest.raises(ValueError, match=r"block: 'nothing'; allowed: headline, verdicts"):

@@ -438,7 +438,7 @@ def test_what_the_loss_does_is_what_the_table_holds(published):
 def test_what_the_step_size_does_is_what_the_tables_hold(published):
     in_words = (
         "(10 seeds), TLwD earns more than DDQN at every p_1^v with step sizes of 1e-05, less at most of them with none"
-        "; DDQN converges at p_1^v = 0.8 in all runs with 0.001 (median episode 4), in 30 % to 30 % with the others"
+        "; DDQN converges at p_1^v = 0.8 in all runs with 0.001 (median episode 4), in 30 % with the others"
     )
     found = mechanisms_text.step_sizes_table(published)
     assert in_words in " ".join(found.split())

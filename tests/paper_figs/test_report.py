@@ -183,6 +183,7 @@ def test_what_to_do_next_is_about_the_run_that_the_page_shows():
     claims = [dataclasses.replace(judgements()[0], verdict="undecided")]
     page = report.render(size, {}, claims, [], [], {"fig9": manifest}, (9,))
     # Of another preset or length no seeds are there.
+    assert "Decide more: 1 statement is undecided" in page
     assert "make figures ARGS=&#39;--seeds 12 --episodes 450 --preset paper_table --only 9&#39;" in page
     assert "sweeps verify OUT/results/paper_table-450-episodes/fig9 --parts 1" in page
 
