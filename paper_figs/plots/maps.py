@@ -58,7 +58,7 @@ def draw(
         figure.colorbar(shown, ax=list(axes[1]), label="difference; crosses: not significant")
     for place in [place for row in axes for place in row if not place.has_data()]:
         place.set_axis_off()
-    figure.suptitle(f"{PANELS[panel][1]} ({style.band_of(numbers.assign(x=numbers.point)).split(',')[0]})")
+    figure.suptitle(f"{PANELS[panel][1]} ({style.band_of(numbers.assign(x=numbers.point), has_bands=False)})")
     return figure
 
 

@@ -71,12 +71,13 @@ def plot(axes: Axes, curve: pd.DataFrame, look: Look, markers: int) -> None:
         axes.fill_between(curve.x, curve.ci_low, curve.ci_high, color=look.color, alpha=0.25, linewidth=0)
 
 
-def band_of(numbers: pd.DataFrame) -> str:
-    """What a figure's title says of its seeds and bands."""
+def band_of(numbers: pd.DataFrame, has_bands: bool = True) -> str:
+    """What a figure's title says of its seeds, of its bands where it has some, and of agents that diverged."""
     seeds = int(numbers.n_seeds.max())
     diverged = int(numbers.drop_duplicates(["algorithm", "x"]).groupby("algorithm").n_diverged.max().sum())
     note = f"; up to {diverged} diverged agents at a point" if diverged else ""
-    return (f"{seeds} seeds, bands: 95 % interval of the mean" if seeds > 1 else "one seed, no interval") + note
+    number, bands = (f"{seeds} seeds", "bands: 95 % interval of the mean") if seeds > 1 else ("one seed", "no interval")
+    return (f"{number}, {bands}" if has_bands else number) + note
 
 
 def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:

@@ -18,7 +18,7 @@ from paper_figs.__main__ import main
 from paper_figs.analysis import divergence, statistics
 from paper_figs.analysis.intervals import mean_effect
 from paper_figs.figures import FIGURES
-from paper_figs.plots import curves, points, style
+from paper_figs.plots import curves, maps, points, style
 from sweeps.results import store
 from sweeps.sweep import Size
 
@@ -221,6 +221,9 @@ def test_diverged_agents_are_counted_in_table_and_title_and_named_in_the_report(
     assert set(table.query("algorithm == 'ddqn'").n_diverged) == {2}
     assert set(table.query("algorithm != 'ddqn'").n_diverged) == {0}
     assert style.band_of(table).endswith("of the mean; up to 2 diverged agents at a point")
+    of_maps = table.assign(panel="a", point=table.x, p=table.x, q=0.0)
+    figure = maps.draw(of_maps, pd.DataFrame(), "a", ("p", "q"), {})
+    assert figure.get_suptitle().endswith("seeds; up to 2 diverged agents at a point)")
     rows = divergence.rows("fig5a", data)
     agent = {"sweep": "fig5a", "algorithm": "ddqn", "point": 0}
     assert rows == [agent | {"seed": 2, "episode": 3}, agent | {"seed": 5, "episode": 700}]
