@@ -42,9 +42,10 @@ def typical(episodes: np.ndarray, error: float = ERROR) -> Interval:
     """Median episode of [n, ...], infinite where fewer than half of the runs converge.
 
     Limits are order statistics, which may be infinite, too, and numbers between two of them (Thompson 1936, Annals of
-    Mathematical Statistics 7; Hettmansperger and Sheather 1986, Statistics and Probability Letters 4). They hold
-    whatever the law of the episodes is. Fewer than five runs have no limits: 0 and infinity. "About 150" is the
-    question whether this interval lies within a band.
+    Mathematical Statistics 7; Hettmansperger and Sheather 1986, Statistics and Probability Letters 4). The former hold
+    whatever the law of the episodes is, the latter where few runs arrive in the same episode: if all arrive within one
+    or two, a limit of 6 runs is wrong in up to 11 %, one of 10 in up to 5.5 %. Fewer than five runs have no limits: 0
+    and infinity. "About 150" is the question whether this interval lies within a band.
     """
     episodes = np.sort(np.asarray(episodes, float), axis=0)
     n = len(episodes)

@@ -50,7 +50,7 @@ def convergence(data: xr.Dataset, columns: tuple[str, ...]) -> pd.DataFrame:
 
 
 def differences(data: xr.Dataset, columns: tuple[str, ...]) -> pd.DataFrame:
-    """Differences of each two learners at each point, paired by seed, with Student's 95 % interval.
+    """Differences of each two learners at each point, paired by seed, with the 95 % interval of `mean_effect`.
 
     Args:
       data: results of a sweep.
