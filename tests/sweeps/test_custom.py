@@ -17,6 +17,9 @@ from jrcjax.training.transfer import TARGET_LEARNERS
 from paper_figs.plots import curves
 from sweeps.__main__ import main
 from sweeps.engine.job import Job
+from sweeps.engine.verify import size_of_part
+from sweeps.results import store
+from sweeps.results.parts import Part
 from sweeps.studies.custom import Options, custom_sweep
 from sweeps.studies.registry import SWEEPS
 from sweeps.studies.source import SOURCE
@@ -341,6 +344,21 @@ def test_one_command_runs_and_draws_it(capsys, tmp_path):
     other = ["run", "custom", "--vary", "env.event_model=marginal,conditional", *size, "--resume"]
     assert main(other) == 2
     assert "holds results of another configuration" in capsys.readouterr().err
+
+
+def test_results_tell_the_size_of_a_run_whose_points_change_a_part_of_it(tmp_path):
+    file = tmp_path / "points.csv"
+    file.write_text("hparams.margin,config.pretraining\n1,7\n2,\n3,5\n")
+    size = Size(seeds=1, episodes=2, pretraining=9, demonstrations=30)
+    for options in (
+        Options(vary=("hparams.margin=1,2",), set=("config.pretraining=7",), learners=("tlwd",)),
+        Options(vary=("config.pretraining=5,7",), learners=("tlwd",)),
+        Options(table=file, learners=("tlwd",)),
+        Options(table=file, learners=("ddqn",)),
+    ):
+        made = store.configuration(Job(custom_sweep(options, "paper"), size))
+        assert size_of_part(Part(tmp_path, range(1), made, {}, "")) == size
+        assert store.configuration(Job(store.sweep_of(made), size)) == made
 
 
 @pytest.fixture
