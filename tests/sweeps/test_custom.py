@@ -18,6 +18,7 @@ from paper_figs.plots import curves
 from sweeps.__main__ import main
 from sweeps.engine.job import Job
 from sweeps.engine.verify import size_of_part
+from sweeps.preset import preset_text
 from sweeps.results import store
 from sweeps.results.parts import Part
 from sweeps.studies.custom import Options, custom_sweep
@@ -91,6 +92,19 @@ def test_several_parameters_give_the_grid_and_settings_their_programs():
     assert custom_sweep(Options(vary=("hparams.margin=1,2",), learners=("tlwd",)), "paper").source is SOURCE
     both = Options(vary=("hparams.margin=1,2", f"{rate}=1e-4,1e-3"), learners=("tlwd",))
     assert custom_sweep(both, "paper").source_points == (0, 1, 0, 1)
+
+
+def test_table_ones_source_agents_are_not_a_presets():
+    options = Options(vary=("hparams.margin=1,2",), learners=("tlwd",), source="table1")
+    shared = preset_text({}, {"config.n_step": 5, "hparams.margin_weight": 2.0, "env.event_model": "marginal"})
+    assert custom_sweep(options, shared).source is SOURCE
+    own = {"hparams.learning_rate": 1e-4, "config.optimiser": "rmsprop"}
+    said = preset_text({}, own | {"source": "table1"})
+    job = Job(custom_sweep(options, said), Size(preset=said)).source
+    assert (float(job.points.hparams.learning_rate[0]), job.groups[0].config.optimiser) == (np.float32(1e-3), "adam")
+    for path, value in own.items():
+        with pytest.raises(ValueError, match=f"source: 'table1'; allowed: .* beside \"{path}\" in the preset's"):
+            custom_sweep(options, preset_text({}, {path: value}))
 
 
 def test_a_sample_fills_its_ranges_and_begins_like_a_larger_one():
