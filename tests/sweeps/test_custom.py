@@ -431,3 +431,11 @@ def test_a_table_is_run_point_by_point(summary_of, tmp_path):
     default = float(jrcjax.HParams().discount)
     rows = [(0.2, 0.9), (0.8, default), (0.4, 0.5)]
     np.testing.assert_allclose(numbers[["env.speed.event_probability.high", "hparams.discount"]], rows, rtol=1e-6)
+
+
+def test_points_that_are_as_many_as_a_grid_has_and_no_grid_get_no_maps(summary_of, tmp_path):
+    table = tmp_path / "points.csv"
+    table.write_text("env.speed.event_probability.high,hparams.discount\n0.2,0.9\n0.2,0.9\n0.8,0.5\n0.8,0.5\n")
+    folder = summary_of("--table", str(table))
+    assert len(pd.read_csv(folder / "custom.csv").point.unique()) == 4
+    assert not (folder / "custom-differences.csv").exists()
