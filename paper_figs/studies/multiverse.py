@@ -139,9 +139,9 @@ def share_of(holds: pd.Series, readings: pd.Series | pd.Index) -> Interval:
 def shares(found: pd.DataFrame) -> pd.DataFrame:
     """One row per claim: the share of readings where it holds; of those with seeds enough, that of each verdict.
 
-    A claim is `unknown` where it has no effect, as where no run of any learner ever converges. `holds` and `unknown`
-    are of `estimates`, all else of what is `judged`, with `holds_then` and `unknown_then` as there; `negligible` is of
-    those where learners are compared.
+    A claim is `unknown` where it has no effect, as where no run of the learners that it compares ever converges.
+    `holds` and `unknown` are of `estimates`, all else of what is `judged`, with `holds_then` and `unknown_then` as
+    there; `negligible` is of those where learners are compared.
     The limits are of 95 %, for readings that come in blocks; `readings` and `judged` count what the shares are of.
     """
     rows = []

@@ -162,6 +162,7 @@ def test_shares_and_what_decides_are_those_of_the_tables(published):
     assert "Shares of 400 readings" in text
     # Of the readings in the fixture's multiverse the default alone has a trade-off, and C3 does not hold in it.
     assert "whose estimate (seeds: 1) is on the statement's side" in text
+    assert "(unknown: no run of those compared converges)" in text
     assert "of the 1 of 2 in which no single action is optimal" in text
     step = f"75 %: {STEP} 0.80 (1e-06 to 2.2e-05); known or not: {MARGIN} 0.60"
     assert f"| C3 (TLwD) | 50 % (45 to 55), unknown in 30 % | 0 % (0 to 95) | 60 % | 0 % | 75 % | {step} |" in text
