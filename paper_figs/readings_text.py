@@ -77,7 +77,8 @@ def readings_list(published: Path) -> str:
     of_judged = f"; of {from_to(judged)} with {seeds} seeds ([verdicts](docs/explanation/readings.md#verdicts))"
     about = paragraph(
         f"Shares of {int(claims.readings.max())} readings ([tables](published/{MULTIVERSE.name})) whose estimate "
-        f"(seeds: {first}) is on the statement's side, with 95 % intervals (unknown: neither learner ever converges); "
+        f"(seeds: {first}) is on the statement's side, with 95 % intervals "
+        "(unknown: no run of those compared converges); "
         f"of the {len(worthwhile)} of {len(worthwhile) + len(idle)} in which no single action is optimal"
         + (of_judged if judged else "")
         + ":"

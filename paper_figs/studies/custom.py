@@ -34,14 +34,15 @@ def summarise(sweeps: tuple[Sweep, ...], size: Size, out: Path) -> list[Path]:
     base = base_of(sweep.environment, size.preset).points
     varied = sweep.design.parameters(base)
     data, slots = store.load(out / sweep.name, size.seeds), base.params.max_steps_in_episode
-    different = {name: len(set(data[name].values.tolist())) for name in varied}
+    places = [data[name].values.tolist() for name in varied]
     path = out / sweep.name / sweep.name
     converged = style.save_table(
         designs.convergence(data, tuple(varied)), path.with_name(f"{path.name}-convergence.csv")
     )
     if len(varied) == 1:
         return [*_lines(data, path, next(iter(varied.values())), slots), converged]
-    if len(varied) == 2 and len(sweep.design) == math.prod(different.values()):
+    cells = math.prod(len(set(along)) for along in places)
+    if len(varied) == 2 and len(set(zip(*places, strict=True))) == len(sweep.design) == cells:
         return [*_maps(data, path, varied, slots), converged]
     return [*_sample(data, path, varied, slots), converged]
 

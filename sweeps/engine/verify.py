@@ -54,8 +54,17 @@ def sample_of(parts: list[Part], number: int | None) -> list[Part]:
 def size_of_part(part: Part) -> Size:
     """The size of the run that a part is of, as far as its configuration says."""
     config, fields = part.configuration, {field.name for field in dataclasses.fields(Size)}
-    held = {name: value for name, value in config["config"].items() if name in fields}
+    held = {name: _of_size(config, name) for name in config["config"] if name in fields}
     return Size(seeds=part.seeds.stop, episodes=config["episodes"], preset=config["preset"], **held)
+
+
+def _of_size(config: dict[str, Any], name: str) -> Any:
+    """What the size says of a setting: as the source has it, whose points leave it alone, or a point that does."""
+    value = config.get("source", config)["config"][name]
+    if not isinstance(value, list):
+        return value
+    (column,) = (column for column, path in config["paths"].items() if path == f"config.{name}")
+    return next((v for v, own in zip(value, config["design"][column], strict=True) if own is None), value[0])
 
 
 def recomputed(part: Part, sweep: Sweep) -> xr.Dataset:

@@ -22,7 +22,7 @@ from jrcjax.types import choice
 from sweeps import design
 from sweeps.design import Design
 from sweeps.preset import SOURCES, base_of, set_in
-from sweeps.studies.source import source_for
+from sweeps.studies.source import ALWAYS_SHARED, is_the_sources, source_for
 from sweeps.sweep import Sweep
 
 CUSTOM = "custom"
@@ -191,6 +191,10 @@ def _with_source(sweep: Sweep, base: Points, preset: str, setting: str) -> Sweep
     if spec_of(base_of("source", preset).points.params)[:2] != spec_of(base.params)[:2]:
         allowed = f"learners without transfer, for levels {base.params.shape} and {base.params.num_actions} actions"
         refuse("learners", " ".join(needing), allowed)
-    of_table1 = "table1" in (setting, set_in(preset).get("source"))
+    own = set_in(preset)
+    if setting == "table1" != own.get("source"):  # what such a preset sets would hold in the source all the same
+        for path in filter(is_the_sources, sorted(own.keys() - ALWAYS_SHARED)):
+            refuse("source", setting, f'{SOURCES[0]}, or "source" = "table1" beside "{path}" in the preset\'s [set]')
+    of_table1 = "table1" in (setting, own.get("source"))
     source, points = source_for(sweep, of_table1)
     return replace(sweep, source=source, source_points=points)

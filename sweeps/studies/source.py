@@ -46,16 +46,17 @@ def source_for(sweep: Sweep, of_table1: bool = False) -> tuple[Sweep, tuple[int,
     Returns:
       The source's sweep, `SOURCE` where nothing differs from Table I, and the number of its point for each point.
     """
-    names = [column.name for column in sweep.design.columns if _is_the_sources(column.path, of_table1)]
+    names = [column.name for column in sweep.design.columns if is_the_sources(column.path, of_table1)]
     design, points = sweep.design.distinct(names)
-    fixed = tuple((path, value) for path, value in sweep.fixed if _is_the_sources(path, of_table1))
+    fixed = tuple((path, value) for path, value in sweep.fixed if is_the_sources(path, of_table1))
     if not design.columns and not fixed:
         return SOURCE, ()
     of_points = {"design": design, "fixed": fixed, "seeds_per_part": sweep.seeds_per_part, "own": True}
     return replace(SOURCE, name=f"{sweep.name}-source", learners=("ddqn",), **of_points), points
 
 
-def _is_the_sources(path: str, of_table1: bool) -> bool:
+def is_the_sources(path: str, of_table1: bool = False) -> bool:
+    """Whether what trains source agents has the learners' number at a path; see `source_for`."""
     if of_table1:
         return path in ALWAYS_SHARED
     return path.startswith(("hparams.", "config.")) and path not in _NOT_THE_SOURCES

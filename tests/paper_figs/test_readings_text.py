@@ -162,6 +162,7 @@ def test_shares_and_what_decides_are_those_of_the_tables(published):
     assert "Shares of 400 readings" in text
     # Of the readings in the fixture's multiverse the default alone has a trade-off, and C3 does not hold in it.
     assert "whose estimate (seeds: 1) is on the statement's side" in text
+    assert "(unknown: no run of those compared converges)" in text
     assert "of the 1 of 2 in which no single action is optimal" in text
     # Others may converge there: no results of two that never do say who is earlier.
     assert "(unknown: neither learner ever converges)" in text

@@ -17,6 +17,10 @@ from jrcjax.training.transfer import TARGET_LEARNERS
 from paper_figs.plots import curves
 from sweeps.__main__ import main
 from sweeps.engine.job import Job
+from sweeps.engine.verify import size_of_part
+from sweeps.preset import preset_text
+from sweeps.results import store
+from sweeps.results.parts import Part
 from sweeps.studies.custom import Options, custom_sweep
 from sweeps.studies.registry import SWEEPS
 from sweeps.studies.source import SOURCE
@@ -88,6 +92,19 @@ def test_several_parameters_give_the_grid_and_settings_their_programs():
     assert custom_sweep(Options(vary=("hparams.margin=1,2",), learners=("tlwd",)), "paper").source is SOURCE
     both = Options(vary=("hparams.margin=1,2", f"{rate}=1e-4,1e-3"), learners=("tlwd",))
     assert custom_sweep(both, "paper").source_points == (0, 1, 0, 1)
+
+
+def test_table_ones_source_agents_are_not_a_presets():
+    options = Options(vary=("hparams.margin=1,2",), learners=("tlwd",), source="table1")
+    shared = preset_text({}, {"config.n_step": 5, "hparams.margin_weight": 2.0, "env.event_model": "marginal"})
+    assert custom_sweep(options, shared).source is SOURCE
+    own = {"hparams.learning_rate": 1e-4, "config.optimiser": "rmsprop"}
+    said = preset_text({}, own | {"source": "table1"})
+    job = Job(custom_sweep(options, said), Size(preset=said)).source
+    assert (float(job.points.hparams.learning_rate[0]), job.groups[0].config.optimiser) == (np.float32(1e-3), "adam")
+    for path, value in own.items():
+        with pytest.raises(ValueError, match=f"source: 'table1'; allowed: .* beside \"{path}\" in the preset's"):
+            custom_sweep(options, preset_text({}, {path: value}))
 
 
 def test_a_sample_fills_its_ranges_and_begins_like_a_larger_one():
@@ -343,6 +360,21 @@ def test_one_command_runs_and_draws_it(capsys, tmp_path):
     assert "holds results of another configuration" in capsys.readouterr().err
 
 
+def test_results_tell_the_size_of_a_run_whose_points_change_a_part_of_it(tmp_path):
+    file = tmp_path / "points.csv"
+    file.write_text("hparams.margin,config.pretraining\n1,7\n2,\n3,5\n")
+    size = Size(seeds=1, episodes=2, pretraining=9, demonstrations=30)
+    for options in (
+        Options(vary=("hparams.margin=1,2",), set=("config.pretraining=7",), learners=("tlwd",)),
+        Options(vary=("config.pretraining=5,7",), learners=("tlwd",)),
+        Options(table=file, learners=("tlwd",)),
+        Options(table=file, learners=("ddqn",)),
+    ):
+        made = store.configuration(Job(custom_sweep(options, "paper"), size))
+        assert size_of_part(Part(tmp_path, range(1), made, {}, "")) == size
+        assert store.configuration(Job(store.sweep_of(made), size)) == made
+
+
 @pytest.fixture
 def summary_of(tmp_path, capsys):
     """Runs a custom sweep of Q-learning, which compiles fast; returns its folder."""
@@ -399,3 +431,11 @@ def test_a_table_is_run_point_by_point(summary_of, tmp_path):
     default = float(jrcjax.HParams().discount)
     rows = [(0.2, 0.9), (0.8, default), (0.4, 0.5)]
     np.testing.assert_allclose(numbers[["env.speed.event_probability.high", "hparams.discount"]], rows, rtol=1e-6)
+
+
+def test_points_that_are_as_many_as_a_grid_has_and_no_grid_get_no_maps(summary_of, tmp_path):
+    table = tmp_path / "points.csv"
+    table.write_text("env.speed.event_probability.high,hparams.discount\n0.2,0.9\n0.2,0.9\n0.8,0.5\n0.8,0.5\n")
+    folder = summary_of("--table", str(table))
+    assert len(pd.read_csv(folder / "custom.csv").point.unique()) == 4
+    assert not (folder / "custom-differences.csv").exists()
