@@ -224,6 +224,20 @@ def test_stable_is_about_movement_and_not_about_the_level():
     assert movement(before=0.0, after=0.0, swing=0.2) == "contradicted"
 
 
+@pytest.mark.parametrize(
+    ("tolerance", "reached", "not_reached"),
+    [(0.02, "contradicted", "supported"), (0.05, "supported", "supported"), (0.4, "supported", "contradicted")],
+)
+def test_what_counts_as_optimal_decides_who_reaches_the_optimum(tolerance, reached, not_reached):
+    learners = {"ddqn": Learner(200, 0.5, after=0.033), "q_learning": Learner(200, 0.5, after=0.2)}
+    quick = {"round_robin": Learner(1, 0.0, after=0.0)}  # so that somebody converges
+    found = claims_of_figure("fig5a", study(learners | quick, 4.0, seeds=5), Rules(tolerance=tolerance))
+    of = {j.claim: (j.verdict, j.limit) for j in found}
+    assert of["C1 (reached)"] == (reached, tolerance)
+    assert of["C2 (Q-learning, source)"] == (not_reached, tolerance)
+    assert of["C1 (stable)"] == ("supported", 0.05)
+
+
 def test_a_number_of_percent_is_what_rounds_to_it():
     found = {j.claim: j for j in all_true()}
     np.testing.assert_allclose([found["C14 (DPR)"].value, found["C14 (DDQN)"].value], [0.22, 0.61], atol=1e-3)
