@@ -183,9 +183,10 @@ def _starts(known: list[Tried], effort: Effort) -> list[np.ndarray]:
     if not known:
         others = [unit_of(1, PER_BLOCK * block)[0] for block in range(1, effort.starts)]
         return [default_unit(), *others]
-    best = sorted(known, key=lambda one: -one.agreement)
-    different = {tuple(values_at(one.unit)[r.path] for r in READINGS if is_static(r)): one.unit for one in best[::-1]}
-    return list(different.values())[::-1][: effort.starts]
+    different: dict[tuple[float, ...], np.ndarray] = {}
+    for one in sorted(known, key=lambda one: -one.agreement):
+        different.setdefault(tuple(values_at(one.unit)[r.path] for r in READINGS if is_static(r)), one.unit)
+    return list(different.values())[: effort.starts]
 
 
 def lost_by_one_action(units: Sequence[np.ndarray]) -> np.ndarray:

@@ -98,6 +98,16 @@ def test_the_search_finds_the_reading_and_confirms_it_with_other_seeds(small_ste
     assert rate == pytest.approx(tried["hparams.learning_rate"][tried.agreement.argmax()], rel=1e-5)
 
 
+def test_a_search_starts_from_the_best_readings_with_different_code():
+    def known(number, held):
+        return reconstruction.Tried(f"multiverse {number}", unit_of(1, number)[0], verdicts_of(np.arange(30) < held))
+
+    # Of each block one code: the best reading of the first has another of its block that agrees least of all.
+    tried = [known(1, 28), known(2, 2), known(PER_BLOCK, 20), known(2 * PER_BLOCK, 24), known(2 * PER_BLOCK + 1, 26)]
+    starts = reconstruction._starts(tried, Effort(starts=2))
+    np.testing.assert_array_equal(starts, [tried[0].unit, tried[4].unit])
+
+
 def test_a_search_is_the_same_each_time(small_steps_only, tmp_path):
     tables = []
     for name in ("first", "second"):
