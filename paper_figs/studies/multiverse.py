@@ -11,15 +11,17 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from jrcjax.checks import refuse
+from jrcjax.training.transfer import TARGET_LEARNERS
 from jrcjax.types import choice
 from paper_figs.analysis.intervals import Interval, clustered_share
 from paper_figs.analysis.sensitivity import LEAST_POINTS, Sensitivity, sensitivity
-from paper_figs.claims.effects import learners_of, metric_of
+from paper_figs.claims.effects import LateGap, TypicalEpisode, learners_of, metric_of
 from paper_figs.claims.judge import UNDECIDED, VERDICTS, Claim, Judgement, is_on_its_side
 from paper_figs.claims.results import Rules
 from paper_figs.claims.table import CLAIMS, claims_of, number_of
 from paper_figs.cores import on_cores
 from paper_figs.plots import readings as plot
+from sweeps.studies.fig5a import FIG5A
 from sweeps.studies.multiverse import points_of, verdicts_file
 from sweeps.studies.readings import PER_BLOCK, READINGS, SOURCE, Reading, range_of, unit_of, values_at
 
@@ -187,9 +189,14 @@ def places(number: int) -> pd.DataFrame:
     return pd.DataFrame(unit, columns=[reading.label for reading in READINGS])
 
 
-def can_act(question: Reading, claim: Claim) -> bool:
-    """Whether a question's answer can move a claim's effect: through a learner that reads it and what it counts."""
+def can_act(question: Reading, claim: Claim, *, on_whether_known: bool = False) -> bool:
+    """Whether a question's answer can move a claim's effect: through a learner that reads it and what it counts.
+
+    Or whether it is known: where that is so as soon as anybody converges, through all learners of the figure.
+    """
     learners = learners_of(claim.measure)
+    if on_whether_known and isinstance(claim.measure, LateGap | TypicalEpisode):
+        learners = frozenset(FIG5A.learners if claim.sweep == FIG5A.name else TARGET_LEARNERS)
     if question.metrics and metric_of(claim.measure) not in question.metrics:
         return False
     if question.path == SOURCE and claim.sweep == "fig5a":
@@ -220,9 +227,9 @@ def decisive(found: pd.DataFrame, episodes: int) -> dict[str, pd.DataFrame]:
 
 def _decisive(claim: Claim, rows: pd.DataFrame, inputs: pd.DataFrame) -> dict[str, pd.DataFrame]:
     """`decisive` of one claim, as far as there are readings enough."""
-    asked = [reading.label for reading in READINGS if can_act(reading, claim)]
 
-    def indices_of(readings: pd.Series, output: np.ndarray) -> Sensitivity:
+    def indices_of(readings: pd.Series, output: np.ndarray, on_whether_known: bool = False) -> Sensitivity:
+        asked = [each.label for each in READINGS if can_act(each, claim, on_whether_known=on_whether_known)]
         numbers = readings.to_numpy(int)
         return sensitivity(inputs.loc[numbers, asked], output, blocks=numbers // PER_BLOCK)
 
@@ -237,5 +244,5 @@ def _decisive(claim: Claim, rows: pd.DataFrame, inputs: pd.DataFrame) -> dict[st
         tables["sensitivity"] = described(of_effect, int(is_known.sum()))
         tables["interactions"] = of_effect.pairs.assign(claim=claim.claim)
     if len(rows) >= LEAST_POINTS and _RARE <= is_known.mean() <= 1 - _RARE:
-        tables["known"] = described(indices_of(rows.reading, is_known.astype(float)), len(rows))
+        tables["known"] = described(indices_of(rows.reading, is_known.astype(float), True), len(rows))
     return tables

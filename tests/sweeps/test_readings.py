@@ -1,5 +1,6 @@
 """Questions that the paper leaves open act on those who read them, and on nobody else."""
 
+import functools
 import itertools
 from dataclasses import replace
 
@@ -78,9 +79,9 @@ def test_a_question_acts_on_those_who_read_it_alone(results):
         assert {name for name, _ in in_source} <= set(of_source), question.path
 
 
-def asked_of(claim):
+def asked_of(claim, **of_what):
     (one,) = [c for c in CLAIMS if c.claim == claim]
-    return {reading.path for reading in READINGS if can_act(reading, one)}
+    return {reading.path for reading in READINGS if can_act(reading, one, **of_what)}
 
 
 def test_each_claim_knows_its_learners_and_its_metric():
@@ -108,3 +109,13 @@ def test_only_questions_that_can_act_are_asked_of_a_claim():
     counts = {"env.count_event_packets", "env.miss_convention"}
     assert asked_of("C9") & counts == {"env.miss_convention"}
     assert asked_of("C8 (throughput, TLwD)") & counts == {"env.count_event_packets"}
+
+
+def test_whether_anybody_converges_is_asked_of_all_who_are_there():
+    known = functools.partial(asked_of, on_whether_known=True)
+    assert known("C2 (Q-learning, target)") == known("C3 (DPR, about 100)") == known("C3 (TLwD, about 100, curve)")
+    assert known("C2 (Q-learning, target)") == {r.path for r in READINGS if "reward" in r.metrics or not r.metrics}
+    assert known("C1 (reached)") == known("C2 (Q-learning, source)") == known("C1 (about 200)")
+    assert known("C1 (reached)") >= asked_of("C1 (reached)") | asked_of("C2 (Q-learning, source)")
+    assert not known("C1 (reached)") & {"hparams.margin", "hparams.initial_weights"}  # TLwD is not in the source
+    assert known("C3 (TLwD, much)") == asked_of("C3 (TLwD, much)")  # known where one of the two converges
