@@ -83,7 +83,8 @@ class GymnasiumEnv(gymnasium.Env):
     ) -> tuple[np.ndarray, dict[str, Any]]:
         """A new episode."""
         if seed is None:
-            seed, self._first_seed = self._first_seed, None
+            seed = self._first_seed
+        self._first_seed = None
         super().reset(seed=seed, options=options)
         if seed is not None:
             self._words = []

@@ -84,7 +84,8 @@ class VectorEnv(gymnasium.vector.VectorEnv):
     ) -> tuple[np.ndarray, dict[str, Any]]:
         """New episodes, of all environments or of those in the mask `options["reset_mask"]`, [N] bool."""
         if seed is None:
-            seed, self._first_seed = self._first_seed, None
+            seed = self._first_seed
+        self._first_seed = None
         super().reset(seed=seed, options=options)
         where = (options or {}).get("reset_mask", np.ones(self.num_envs, bool))
         if not isinstance(where, np.ndarray) or where.dtype != bool or where.shape != (self.num_envs,):

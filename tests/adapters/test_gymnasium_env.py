@@ -3,6 +3,7 @@
 import copy
 import itertools
 import pickle
+from functools import partial
 
 import jax.numpy as jnp
 import numpy as np
@@ -14,7 +15,7 @@ import jrcjax
 gymnasium = pytest.importorskip("gymnasium", reason="needs the extra 'gymnasium'")
 
 import jrcjax.adapters  # noqa: E402
-from jrcjax.adapters import GymnasiumEnv  # noqa: E402
+from jrcjax.adapters import GymnasiumEnv, VectorEnv  # noqa: E402
 
 TARGET, ANY = "jrcjax/JRC-target-v0", "jrcjax/JRC-v0"
 
@@ -116,6 +117,16 @@ def test_the_same_seed_gives_the_same_episodes():
     other = episode_of(envs[1], seed=4)
     assert not np.array_equal([step[1] for step in first[1:]], [step[1] for step in other[1:]])
     assert all(envs[0].observation_space.contains(step[0]) for step in first)
+
+
+def test_a_reset_without_a_seed_goes_on_from_the_last_one():
+    """The constructor's seed counts until another is given, and then no more."""
+    for make in (partial(GymnasiumEnv, tiny_params()), partial(VectorEnv, 3, tiny_params())):
+        seeded, plain = make(seed=3), make()
+        first = [env.reset(seed=5)[0] for env in (seeded, plain)]
+        np.testing.assert_array_equal(*first)
+        later = [np.stack([env.reset()[0] for _ in range(20)]) for env in (seeded, plain)]
+        np.testing.assert_array_equal(*later)
 
 
 def test_observations_are_the_callers():
