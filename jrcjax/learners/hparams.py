@@ -76,7 +76,7 @@ class HParams(Container):
     importance_start: Float[Array, ""] = number(PROBABILITY, default=0.6)
     """beta of equation (24) at first."""
     importance_end: Float[Array, ""] = number(PROBABILITY, default=1.0)
-    """beta in the last update; linear in between."""
+    """beta after the last update; linear in between."""
     importance_over: Int[Array, ""] = reading(ImportanceOver)
     """Whether beta rises over pre-training and training together, or over training alone."""
     n_step_weight: Float[Array, ""] = number(NOT_NEGATIVE, default=1.0)

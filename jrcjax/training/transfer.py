@@ -52,8 +52,8 @@ def transfer(
     """Trains a source agent, lets it demonstrate, and trains all learners in the target environment.
 
     Pure, and vmappable over all positional arguments. Under a vmap over `target_params` alone the source agent is
-    trained once, since nothing of it depends on the target. All learners start from the same key, so they meet the
-    same random numbers.
+    trained once, since nothing of it depends on the target. All learners start from the same key; those that draw as
+    many words in a slot, as "ddqn" and "dpr" do, meet the same states and events, the others have numbers of their own.
 
     Args:
       key: the seed's PRNG key.

@@ -163,6 +163,7 @@ def test_beta_rises_from_0_6_in_the_first_update_to_1_after_the_last():
     assert at(0) == float(np.float32(0.6))
     np.testing.assert_allclose([at(10_000), at(155_000)], [0.6 + 0.4 / 31, 0.8], rtol=1e-6)
     np.testing.assert_allclose([at(updates - 1), at(updates)], 1.0, rtol=2e-6)
+    assert float(beta(0, 0, 1, HParams())) == float(np.float32(0.6))  # the last update itself is a step before the end
     constant = HParams(importance_start=jnp.float32(0.3), importance_end=jnp.float32(0.3))
     assert float(beta(7, 5, 5, constant)) == float(np.float32(0.3))
 

@@ -10,6 +10,7 @@ from significance import ALPHA, chi_square, z
 
 from jrcjax import EnvState, JRCEnv
 from jrcjax.model import states
+from jrcjax.model.transitions import next_level
 
 LANES, SLOTS = 2500, 400  # a million slots, past the time limit of 300
 
@@ -177,6 +178,17 @@ def test_time_limit(env, target, terminal):
     assert int(led_to[1].time) == 300
     np.testing.assert_array_equal(obs, env.reset(reset_key, params)[0])
     np.testing.assert_array_equal(obs, env.get_obs(new, params))
+
+
+@pytest.mark.parametrize("kappa", [0.95, 0.9999])
+def test_what_persistence_draws_anew_follows_the_prior(target, kappa):
+    """As exactly as its docstring says, over all numbers of 24 bits that draw."""
+    factor = target.speed.replace(persistence=kappa)
+    exact = float(factor.persistence)
+    numbers = jnp.arange(int(np.ceil(exact * 2**24)), 2**24, dtype=jnp.float32) / 2**24
+    drawn = jax.jit(jax.vmap(next_level, in_axes=(0, None, None)))(numbers, jnp.int32(0), factor)
+    share = np.bincount(drawn, minlength=2) / len(drawn)
+    np.testing.assert_allclose(share, factor.prior, rtol=0, atol=2**-24 / (1 - exact) + 1e-6)
 
 
 def test_reset_is_independent_of_the_last_slot(env, target):

@@ -17,6 +17,7 @@ from jrcjax.checks import require_keys
 from jrcjax.learners import LEARNERS, Learner, Source, Spec
 from jrcjax.learners.hparams import Config, HParams
 from jrcjax.model.params import Factor
+from jrcjax.replay import packing, prioritised, uniform
 from jrcjax.training import rollout
 from jrcjax.training.source import demonstrate
 from jrcjax.training.transfer import TARGET_LEARNERS, Transfer, target_key
@@ -80,6 +81,19 @@ def test_logs_are_those_of_train_with_the_source(learner, study, params):
     agent, log = trained(learner)(target_key(KEYS[0]), params[1], HPARAMS, study.source)
     assert_close(study.logs[learner], log)
     assert_close(study.agents[learner].learner, agent.learner)
+
+
+def test_learners_that_draw_as_many_words_in_a_slot_meet_the_same_states(study, params):
+    """DPR and DDQN do; TLwD draws two words for each of a mini-batch and has states of its own."""
+    slots = CONFIG.episodes * params[1].max_steps_in_episode
+    layout = uniform.layout_of(params[1].num_states, params[1].num_actions)
+    ddqn, dpr = (packing.unpack(study.agents[name].learner.ring[:slots], layout).state for name in ("ddqn", "dpr"))
+    np.testing.assert_array_equal(ddqn, dpr)
+    lines = prioritised.layout_of(
+        params[1].num_states, params[1].num_actions, CONFIG.replay_capacity, CONFIG.demonstrations, CONFIG.n_step
+    )
+    held = prioritised.contents(study.agents["tlwd"].learner.replay, lines, HPARAMS.discount)[1].state
+    assert (held[CONFIG.demonstrations :][: slots - CONFIG.n_step] != ddqn[: slots - CONFIG.n_step]).any()
 
 
 def test_the_source_is_a_ddqn_agent_and_what_it_does_then(study, params):
