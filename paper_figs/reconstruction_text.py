@@ -112,7 +112,8 @@ def search_list(published: Path) -> str:
     in_words = "; ".join(f"{claims} {verdict}" for verdict, claims in headlines.items())
     sentences = [
         f"Of {len(tried)} readings, {_searched(tried)} of them from a search, {named(best.reading.iloc[0])} agreed "
-        f"most with the text: of {len(best)} statements {counted(best)} by {int(best.n_seeds.max())} fresh seeds "
+        f"most with the text{_so_far(tried, best.reading.iloc[0])}: of {len(best)} statements "
+        f"{counted(best)} by {int(best.n_seeds.max())} fresh seeds "
         f"([all]({_PAGE})), with {in_words}.",
         f"{_world_in_short(published)} {trade_off_in_short(published)} "
         + (
@@ -140,7 +141,8 @@ def best_list(published: Path) -> str:
     agreement = tried.set_index("reading").agreement
     sentences = [
         f"Of {len(tried)} readings, {_searched(tried)} of them proposed by the search, {named(name)} agrees best with "
-        f"the text: its {promising(best)} promised {int(best.promised.sum())} of {len(best)} statements (agreement "
+        f"the text{_so_far(tried, name)}: its {promising(best)} promised {int(best.promised.sum())} of {len(best)} "
+        "statements (agreement "
         f"{percent(agreement[name])}, default {percent(agreement[DEFAULT])}), and {int(best.n_seeds.max())} fresh "
         f"seeds gave {int(best.holds.sum())} (agreement {percent(multiverse.agreement(best).mean())}): "
         f"{counted(best)}.",
@@ -162,6 +164,17 @@ def best_list(published: Path) -> str:
         never_judged_so(published, _unconfirmed(confirmed, closest)),
     ]
     return listed(sentences)
+
+
+def _so_far(tried: pd.DataFrame, confirmed: str) -> str:
+    """Which reading promises more than the best of those that fresh seeds confirmed; nothing where none does."""
+    best = tried.loc[tried.agreement.idxmax()]
+    if best.agreement <= tried.set_index("reading").agreement[confirmed]:
+        return ""
+    return (
+        f", of those with fresh seeds ({named(best.reading)}, which promises an agreement of "
+        f"{percent(best.agreement)}, has none yet)"
+    )
 
 
 def _supported(confirmed: pd.DataFrame) -> set[str]:
