@@ -25,6 +25,8 @@ from jrcjax.model.params import EnvParams, of_params
 from jrcjax.readings import MissConvention
 from jrcjax.types import Float
 
+_ROUNDING = 1e-5  # of sums over states, relative
+
 
 class Boundary(NamedTuple):
     """Corners of a boundary in the order of rising throughput; V = S (A - 1) + 1 of them, some of which coincide."""
@@ -124,12 +126,12 @@ def front(params: EnvParams) -> Boundary:
 def lowest_miss_detection(params: EnvParams, throughput: Float | float) -> Float:
     """The smallest miss detection of any policy with this throughput or more, in packets per slot; any shape.
 
-    NaN beyond the largest throughput that can be reached.
+    NaN beyond the largest throughput that can be reached, by more than rounding.
     """
     corners = front(params)
     wanted = jnp.asarray(throughput, jnp.float32)
     lowest = jnp.interp(wanted, corners.throughput, corners.miss_detection)
-    return jnp.where(wanted <= corners.throughput[-1], lowest, jnp.nan)
+    return jnp.where(wanted <= (1.0 + _ROUNDING) * corners.throughput[-1], lowest, jnp.nan)
 
 
 @of_params

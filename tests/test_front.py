@@ -81,6 +81,18 @@ def test_between_corners_against_a_linear_program(environments, name, convention
     assert np.isnan(front.lowest_miss_detection(params, most + 0.01))
 
 
+def test_the_largest_throughput_is_reached_whatever_rounding_does(target):
+    """The policy that sends the most is on the front; its throughput is another sum of the same numbers."""
+
+    def above(tau):
+        params = target.replace(channel=target.channel.replace(prior=jnp.stack([tau, 1.0 - tau])))
+        packets = exact.packet_table(params)
+        run = exact.evaluate_policy(params, exact.policy_of_actions(packets.argmax(axis=1), packets.shape[1]))
+        return run.miss_detection - front.lowest_miss_detection(params, run.throughput)
+
+    np.testing.assert_allclose(jax.jit(jax.vmap(above))(jnp.linspace(0.05, 0.95, 19)), 0.0, atol=ATOL)
+
+
 def test_a_corner_is_what_its_policy_does(target):
     corners = np.stack(front.front(target), axis=1)
     for price in (0.0, 0.05, 0.2, 10.0):

@@ -54,9 +54,9 @@ class GymnaxEnv(JRCEnv, Environment):  # pyright: ignore[reportGeneralTypeIssues
         return spaces.Box(box.low, box.high, box.shape, jnp.dtype(box.dtype))
 
     def state_space(self, params: EnvParams | None = None) -> Any:
-        """State ids and slots since the episode began, as `gymnax.environments.spaces.Dict`."""
+        """The fields of `EnvState`, as `gymnax.environments.spaces.Dict`."""
         from gymnax.environments import spaces  # pyright: ignore[reportMissingImports]
 
         params = self._given(params)
         ids, times = spaces.Discrete(params.num_states), spaces.Discrete(params.max_steps_in_episode + 1)
-        return spaces.Dict({"id": ids, "time": times})
+        return spaces.Dict({"id": ids, "time": times, "first": ids})

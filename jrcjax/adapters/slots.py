@@ -187,8 +187,12 @@ def _slots_of(content: _Content) -> Slots:
     return TableSlots(content.params, tables_of(content.params)) if fit(content.params) else JaxSlots(content.params)
 
 
-@lru_cache
 def paper_slots(environment: str = "target", preset: str = "paper") -> Slots:
     """The slots of the paper's source or target environment; arguments and errors as those of `paper_params`."""
+    return _paper_slots(environment, preset)  # so that a default and the same argument are found as one
+
+
+@lru_cache
+def _paper_slots(environment: str, preset: str) -> Slots:
     require_jax("an environment with new parameters")
     return slots_of(paper_params(environment, preset))

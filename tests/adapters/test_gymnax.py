@@ -179,7 +179,10 @@ def test_gymnax_ends_of_episodes(terminal):
         assert float(env.discount(state, params)) == (0.0 if ends else 1.0)
         np.testing.assert_array_equal(env.observe(jax.random.key(0), state, 1, params), env.get_obs(state, params))
         assert env.state_space(params).contains(state)
-    assert env.state_space(params).spaces["id"].n == params.num_states
+    space = env.state_space(params)
+    assert space.spaces["id"].n == params.num_states
+    assert space.contains(jrcjax.EnvState(**space.sample(jax.random.key(0))))
+    assert not space.contains(jrcjax.EnvState(jnp.int32(7), jnp.int32(0), jnp.int32(params.num_states)))
     assert not env.supports_transition_gradients
 
 

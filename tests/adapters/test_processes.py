@@ -35,6 +35,10 @@ def test_gymnasiums_asynchronous_vector_forks(forked):
     assert first != second
 
 
+def test_an_environment_that_the_parent_made_without_its_id(forked):
+    assert forked["by_id"] == [True, True]
+
+
 @pytest.mark.parametrize("case", ["picture", "new", "fresh"])
 def test_what_needs_jax_is_refused_in_a_forked_process(forked, case):
     assert "needs JAX, which does not run in a process forked" in forked[case]

@@ -1,5 +1,6 @@
 """The pages' code runs as written, what they name exists, and the site has a place for each of them."""
 
+import pkgutil
 import re
 from pathlib import Path
 
@@ -63,6 +64,25 @@ def test_files_that_texts_name_exist(text):
     if text in READMES:  # pages name files of their reader's, too
         paths += re.findall(r"`([\w/]+\.py)`", text.read_text())
     assert [path for path in paths if not list(ROOT.glob(path))] == []
+
+
+@pytest.mark.parametrize("text", TEXTS, ids=path_of)
+def test_names_in_the_package_exist(text):
+    names = set(re.findall(r"\bjrcjax(?:\.[A-Za-z_]\w*)+", LINK.sub("", text.read_text())))
+    assert sorted(name for name in names if not is_there(name)) == []
+
+
+def is_there(name):
+    """Whether a dotted name is a file of the package, a module, or something in one."""
+    if name.endswith((".toml", ".py")):
+        return True
+    try:
+        pkgutil.resolve_name(name)
+    except ModuleNotFoundError as error:
+        return not error.name.startswith("jrcjax")  # a client's adapter without its client
+    except AttributeError:
+        return False
+    return True
 
 
 @pytest.mark.parametrize("text", TEXTS, ids=path_of)

@@ -52,6 +52,14 @@ def made_in_child(params):
         return str(error)
 
 
+def made_by_id_in_child(name):
+    """Whether an id makes an environment in this process, or what it leads to."""
+    try:
+        return gymnasium.make(name).unwrapped.params is not None
+    except RuntimeError as error:
+        return str(error)
+
+
 def picture_in_child(env):
     """What drawing in this process leads to."""
     try:
@@ -73,11 +81,13 @@ def fork():
     env.reset(seed=0)
     fresh = params.replace(radar=params.radar.replace(placements="fresh"))
     new = params.replace(reward_weights=2 * params.reward_weights)
+    GymnasiumEnv()
     return {
         "here": rewards_of(env),
         "async": vector_rewards(params=params),
         "pickled": in_child("fork", rewards_of, env),
         "made": in_child("fork", made_in_child, env.params),
+        "by_id": [in_child("fork", made_by_id_in_child, f"jrcjax/JRC-{name}v0") for name in ("", "target-")],
         "picture": in_child("fork", picture_in_child, env),
         "new": in_child("fork", made_in_child, jax_free(new)),
         "fresh": in_child("fork", made_in_child, jax_free(fresh)),
