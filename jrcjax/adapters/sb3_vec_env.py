@@ -55,8 +55,9 @@ class SB3VecEnv(VecEnv):
         """Does nothing: there are no processes to end."""
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """An attribute of the environments, which share it."""
-        return [getattr(self.venv, attr_name)] * len(self._indices(indices))
+        """An attribute of the environments, which share it; spaces are those of one environment."""
+        owner = self if attr_name in ("action_space", "observation_space") else self.venv
+        return [getattr(owner, attr_name)] * len(self._indices(indices))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
         """Refused: the environments have no attributes of their own."""

@@ -66,6 +66,9 @@ def test_its_wrappers_take_many():
     infos = [env.step(np.full(3, 4))[3] for _ in range(20)][-1]
     assert [info["episode"]["l"] for info in infos] == [20] * 3
     assert env.get_attr("render_mode") == [None] * 3
+    one = GymnasiumEnv(tiny_params())
+    assert env.get_attr("action_space", [0, 2]) == [one.action_space] * 2
+    assert env.get_attr("observation_space") == [one.observation_space] * 3
     assert env.env_is_wrapped(VecMonitor) == [False] * 3
     with pytest.raises(AttributeError, match="no attributes of their own"):
         env.set_attr("params", None)
