@@ -115,6 +115,7 @@ def test_figures_of_another_run_than_the_manifests_are_not_published(drawn, tmp_
     record.write(drawn, record.record_of(size, [figure.name for figure in figures], delta))
     with pytest.raises(ValueError, match=message):
         publish.figures_from(drawn, tmp_path / "figures")
+    assert not (tmp_path / "figures").exists()
 
 
 @pytest.mark.parametrize("name", ["fig9.png", record.FILE, "results/paper-1000-episodes/source/manifest.json"])
@@ -122,6 +123,7 @@ def test_with_a_file_missing_nothing_is_published(drawn, tmp_path, name):
     (drawn / name).unlink()
     with pytest.raises(ValueError, match=f"folder: '{drawn}'; allowed: one to which .* all figures: {name}$"):
         publish.figures_from(drawn, tmp_path / "figures")
+    assert not (tmp_path / "figures").exists()
 
 
 def test_a_summary_is_published_whole_and_without_files_of_the_one_before(tmp_path):
