@@ -55,7 +55,7 @@ def made_in_child(params):
 def made_by_id_in_child(name):
     """Whether an id makes an environment in this process, or what it leads to."""
     try:
-        return gymnasium.make(name).unwrapped.params is not None
+        return isinstance(gymnasium.make(name).unwrapped, GymnasiumEnv)
     except RuntimeError as error:
         return str(error)
 
