@@ -108,8 +108,9 @@ def main(args: list[str] | None = None) -> None:
     params = jrcjax.paper_params("target")
     optimum = float(jrcjax.exact.evaluate_policy(params, jrcjax.exact.optimal_policy(params)).reward)
     rewards = train_both(params, given.episodes, given.seeds, given.scale)
-    late = [of_agents[:, -(given.episodes // 4) :].mean(axis=1) for of_agents in rewards]
-    print(f"reward per slot in the last {given.episodes // 4} of {given.episodes} episodes; optimum {optimum:.2f}")
+    quarter = max(1, given.episodes // 4)
+    late = [of_agents[:, -quarter:].mean(axis=1) for of_agents in rewards]
+    print(f"reward per slot in the last {quarter} of {given.episodes} episodes; optimum {optimum:.2f}")
     for name, rewards in zip(("Stable-Baselines3, DQN", "jrcjax, Double DQN"), late, strict=True):
         low, high = stats.ttest_1samp(rewards, 0.0).confidence_interval()
         print(f"{name}: {rewards.mean():.2f} ({low:.2f} to {high:.2f}), {given.seeds} seeds")

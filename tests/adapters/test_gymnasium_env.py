@@ -144,6 +144,10 @@ def test_observations_are_the_callers():
 def test_the_time_limit_as_a_terminal_state():
     env = GymnasiumEnv(tiny_params().replace(terminal_time_limit=jnp.int32(1)))
     assert episode_of(env, seed=0)[-1][2:4] == (True, False)
+    # Gymnasium's own limit of the paper's ids truncates in the same slot, whatever the parameters say.
+    full = env.params.replace(max_steps_in_episode=300)
+    ends = [episode_of(gymnasium.make(name, params=full), seed=0)[-1][2:4] for name in (TARGET, ANY)]
+    assert ends == [(True, True), (True, False)]
 
 
 @pytest.mark.parametrize("copied", [lambda env: pickle.loads(pickle.dumps(env)), copy.deepcopy])
