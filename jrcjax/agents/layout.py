@@ -56,9 +56,17 @@ def content_of(tensors: dict[str, np.ndarray], about: dict[str, Any]) -> bytes:
     """The bytes of a sealed file."""
     from safetensors.numpy import save  # here, since importing the package needs it for nothing else
 
-    metadata = {ABOUT: json.dumps(about), _SEAL: _UNSEALED}
-    content = save({name: np.ascontiguousarray(array) for name, array in tensors.items()}, metadata)
+    plain = save({name: np.ascontiguousarray(array) for name, array in tensors.items()})
+    content = _with_metadata(plain, {ABOUT: json.dumps(about), _SEAL: _UNSEALED})
     return _with_seal(content, _UNSEALED, hashlib.sha256(content).hexdigest())
+
+
+def _with_metadata(content: bytes, metadata: dict[str, str]) -> bytes:
+    """A safetensors file with metadata in its header; the library's own come in an order that changes."""
+    start = 8 + int.from_bytes(content[:8], "little")
+    header = json.dumps({"__metadata__": metadata} | json.loads(content[8:start]), separators=(",", ":")).encode()
+    header += b" " * (-len(header) % 8)  # tensors start at a multiple of 8
+    return len(header).to_bytes(8, "little") + header + content[start:]
 
 
 def _with_seal(content: bytes, old: str, new: str) -> bytes:

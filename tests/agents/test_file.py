@@ -18,6 +18,7 @@ from jrcjax.agents import layout
 from jrcjax.config.toml import to_toml
 from jrcjax.model import states
 from jrcjax.model.params import Factor
+from jrcjax.provenance import provenance
 from jrcjax.training import rollout
 from jrcjax.training.source import source_of
 from sweeps.design import along
@@ -280,8 +281,10 @@ def test_what_could_not_be_loaded_is_not_saved(change, message, trained, params,
     path.unlink()
 
 
-def test_agents_of_another_process_are_saved(trained, params, tmp_path):
-    """They come as arrays of NumPy, and so do the words of their keys."""
+def test_agents_of_another_process_are_saved(trained, params, tmp_path, monkeypatch):
+    """They come as arrays of NumPy, and so do the words of their keys; what was saved at the same time is the same."""
+    when = provenance()
+    monkeypatch.setattr("jrcjax.agents.file.provenance", lambda: when)
     here = stacked(trained["ddqn"][0]._replace(learner={"weights": trained["ddqn"][0].learner.weights}), 1, 1)
     there = jax.device_get(here._replace(key=jax.random.key_data(here.key)))
     rest = {"env_params": stacked(params, 1), "hparams": stacked(HPARAMS, 1), "config": CONFIG, "seeds": (0,)}
